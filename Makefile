@@ -1,0 +1,80 @@
+# Works from any folder: `make`, `make -C path`, `make -f path/Makefile`. `make help` lists the targets.
+
+ROOT := $(patsubst %/,%,$(dir $(abspath $(lastword $(MAKEFILE_LIST)))))
+VENV := $(ROOT)/.venv
+PY := $(VENV)/bin/python
+PYTHON ?= $(shell command -v python3.11 || command -v python3)
+RUN := runs/circle_lwr4plus/vprnn-seed0
+
+# What is installed follows from these; a stamp named after them says that pip has nothing to do.
+STATE := $(shell { echo '$(ROOT)'; cat '$(ROOT)/pyproject.toml' '$(ROOT)/constraints.txt'; } | cksum | tr ' ' '-')
+INSTALLED := $(VENV)/.surgsim-$(STATE)
+INSTALLED_DEV := $(VENV)/.surgsim-dev-$(STATE)
+PIP_INSTALL := "$(PY)" -m pip install --quiet --disable-pip-version-check -c "$(ROOT)/constraints.txt"
+OLD_ENOUGH := import sys; v = sys.version_info; sys.exit(0 if v >= (3, 11) else "surgsim needs Python 3.11 or newer; %s is %d.%d. Set PYTHON=/path/to/python3.11" % (sys.executable, v[0], v[1]))
+
+.DEFAULT_GOAL := help
+.DELETE_ON_ERROR:
+.NOTPARALLEL:
+.PHONY: help install install-dev run test test-all check bench pictures wheel clean
+
+help:  ## list the targets
+	@sed -n 's/^\([a-z-]*\):.*  ## \(.*\)/\1|\2/p' '$(ROOT)/Makefile' | awk -F'|' '{ printf "%-12s %s\n", $$1, $$2 }'
+
+install: $(INSTALLED)  ## create .venv and install surgsim in it (editable)
+
+install-dev: $(INSTALLED_DEV)  ## the same with the tools of tests and checks
+
+run: $(INSTALLED)  ## run the circle scenario, then inspect its recording
+	@cd '$(ROOT)' && "$(PY)" -m surgsim run circle_lwr4plus --out '$(RUN)'
+	@echo
+	@cd '$(ROOT)' && "$(PY)" -m surgsim inspect '$(RUN)'
+	@echo && echo 'written to $(ROOT)/$(RUN):' && ls -l '$(ROOT)/$(RUN)'
+
+test: $(INSTALLED_DEV)  ## run the tests, slow ones left out
+	@cd '$(ROOT)' && "$(PY)" -m pytest -n 2 -m "not slow"
+
+test-all: $(INSTALLED_DEV)  ## run all tests
+	@cd '$(ROOT)' && "$(PY)" -m pytest -n 2
+
+check: $(INSTALLED_DEV)  ## formatting, lint and types, as CI
+	@cd '$(ROOT)' && "$(PY)" -m ruff format --check .
+	@cd '$(ROOT)' && "$(PY)" -m ruff check .
+	@cd '$(ROOT)' && "$(PY)" -m mypy
+
+bench: $(INSTALLED)  ## measure the speed on this machine
+	@cd '$(ROOT)' && "$(PY)" -m surgsim bench
+
+pictures: $(INSTALLED_DEV)  ## draw the scene pictures of docs/images again; needs OpenGL
+	@cd '$(ROOT)' && "$(PY)" docs/images/draw.py
+
+wheel: $(INSTALLED_DEV)  ## build the wheel into dist/
+	@cd '$(ROOT)' && "$(PY)" -m pip wheel --quiet --no-build-isolation --no-deps --wheel-dir dist .
+	@ls -l '$(ROOT)'/dist/*.whl
+
+clean:  ## remove build products and caches; .venv and runs stay
+	@cd '$(ROOT)' && rm -rf build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	@find '$(ROOT)/surgsim' '$(ROOT)/tests' -name __pycache__ -type d -prune -exec rm -rf {} +
+
+# $(call install,REQUIREMENT): the build tools come first, so that they too follow constraints.txt.
+define install
+	@"$(PY)" -c '$(OLD_ENOUGH)'
+	@"$(PY)" -m pip --version > /dev/null 2>&1 || "$(PY)" -m ensurepip
+	@echo 'installing surgsim into $(VENV)' >&2
+	@$(PIP_INSTALL) hatchling editables
+	@$(PIP_INSTALL) --no-build-isolation -e '$(1)'
+	@rm -f '$(VENV)'/.surgsim-*
+endef
+
+$(INSTALLED): | $(PY)
+	$(call install,$(ROOT))
+	@touch '$(INSTALLED)'
+
+$(INSTALLED_DEV): | $(PY)
+	$(call install,$(ROOT)[dev])
+	@touch '$(INSTALLED)' '$(INSTALLED_DEV)'
+
+$(PY):
+	@test -n '$(PYTHON)' || { echo 'surgsim needs Python 3.11 or newer, and none was found. Set PYTHON=/path/to/python3.11' >&2; exit 1; }
+	@"$(PYTHON)" -c '$(OLD_ENOUGH)'
+	@"$(PYTHON)" -m venv '$(VENV)'

@@ -1,0 +1,7 @@
+"""`python -m surgsim`."""
+
+import sys
+
+from surgsim.cli.main import main
+
+sys.exit(main())

@@ -1,0 +1,74 @@
+"""`surgsim list`."""
+
+import argparse
+import json
+
+HELP = "list what a scenario can name"
+EXAMPLES = """examples:
+  surgsim list scenarios
+  surgsim list resolvers --json
+"""
+
+KINDS = (
+    "scenarios",
+    "suites",
+    "controllers",
+    "robots",
+    "tasks",
+    "resolvers",
+    "torque-laws",
+    "disturbances",
+    "metrics",
+)
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the command's arguments."""
+    parser.add_argument("kind", choices=KINDS, metavar="KIND", help=", ".join(KINDS))
+    parser.add_argument("--json", action="store_true", help="print JSON")
+
+
+def execute(options: argparse.Namespace) -> int:
+    """Print the names with a line about each."""
+    from surgsim.cli.output import print_table
+
+    items = _items(options.kind)
+    if options.json:
+        print(json.dumps([{"name": name, "description": text} for name, text in items], indent=2))
+    else:
+        print_table(f"{len(items)} {options.kind}", ("name", "description"), items)
+    return 0
+
+
+def _items(kind: str) -> list[tuple[str, str]]:
+    if kind in ("scenarios", "suites", "controllers"):
+        return _files(kind)
+    if kind == "robots":
+        from surgsim.models.robot import robot_names
+
+        return [(name, "") for name in robot_names()]
+    if kind == "metrics":
+        from surgsim.metrics.catalog import METRICS
+
+        return [(metric.name, metric.meaning) for metric in METRICS.values()]
+    from surgsim.control.resolvers import RESOLVERS
+    from surgsim.control.torque_laws import TORQUE_LAWS
+    from surgsim.plant.disturbances import DISTURBANCES
+    from surgsim.tasks import TASKS
+
+    catalogs = {
+        "tasks": TASKS,
+        "resolvers": RESOLVERS,
+        "torque-laws": TORQUE_LAWS,
+        "disturbances": DISTURBANCES,
+    }
+    catalog = catalogs[kind]
+    return [(name, catalog.summary(name)) for name in catalog.names()]
+
+
+def _files(kind: str) -> list[tuple[str, str]]:
+    from surgsim.scenario.load import shipped
+    from surgsim.scenario.yaml_text import read_yaml
+
+    files = shipped("" if kind == "scenarios" else kind)
+    return [(name, str(read_yaml(path).tree.get("description", ""))) for name, path in files.items()]

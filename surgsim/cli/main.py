@@ -1,0 +1,63 @@
+"""Entry point: parses the command line and runs one command.
+
+Exit status: 0 done; 1 the run ended with an outcome other than completed, or figures differ; 2 the user's
+input is wrong.
+"""
+
+import argparse
+import importlib
+import os
+import sys
+from collections.abc import Sequence
+
+from surgsim import __version__
+from surgsim.errors import SurgsimError
+
+COMMANDS = ("run", "check", "list", "inspect", "bench")
+_EPILOG = """examples:
+  surgsim run circle_lwr4plus                      run a shipped scenario, write its folder below runs/
+  surgsim run my.yaml --set task.radius_m=0.03     run your own, with one value changed
+  surgsim check my.yaml                            say what is wrong with it, or print it with every default
+  surgsim list controllers                         what can be named in a scenario
+  surgsim inspect runs/circle_lwr4plus/vprnn-seed0 --view
+"""
+
+
+def build_parser() -> argparse.ArgumentParser:
+    """The whole command line; imports nothing heavy."""
+    parser = argparse.ArgumentParser(
+        prog="surgsim",
+        description="Benchmark for controllers that move a surgical instrument through a trocar.",
+        epilog=_EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("--version", action="version", version=f"surgsim {__version__}")
+    commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
+    for name in COMMANDS:
+        module = importlib.import_module(f"surgsim.cli.{name}")
+        sub = commands.add_parser(
+            name,
+            help=module.HELP,
+            description=module.HELP[0].upper() + module.HELP[1:] + ".",
+            epilog=module.EXAMPLES,
+            formatter_class=argparse.RawDescriptionHelpFormatter,
+        )
+        module.add_arguments(sub)
+        sub.set_defaults(execute=module.execute)
+    return parser
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run one command and return its exit status."""
+    options = build_parser().parse_args(arguments)
+    try:
+        return int(options.execute(options))
+    except SurgsimError as error:
+        print(f"surgsim: {error}", file=sys.stderr)
+        return 2
+    except KeyboardInterrupt:
+        print("surgsim: interrupted, nothing was written", file=sys.stderr)
+        return 130
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0

@@ -1,0 +1,93 @@
+"""Tables and progress as a person reads them: data on stdout, progress on stderr."""
+
+import math
+import sys
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+from rich.table import Table
+
+from surgsim.simulate.loop import Progress as ProgressCall
+
+
+def format_number(value: float | None, digits: int = 4) -> str:
+    """A figure with `digits` significant digits; a dash where it is not defined."""
+    if value is None or math.isnan(value):
+        return "-"
+    if value == 0.0:
+        return "0"
+    if 1e-3 <= abs(value) < 1e5:
+        return f"{value:.{max(0, digits - 1 - math.floor(math.log10(abs(value))))}f}"
+    return f"{value:.{digits - 1}e}"
+
+
+def print_table(
+    title: str, header: Sequence[str], rows: Sequence[Sequence[str]], right: Sequence[int] = ()
+) -> None:
+    """Print a table; the columns in `right` are right-aligned."""
+    table = Table(title=title, title_justify="left", box=None, pad_edge=False, header_style="bold")
+    for index, name in enumerate(header):
+        table.add_column(name, justify="right" if index in right else "left", no_wrap=index in right)
+    for row in rows:
+        table.add_row(*row)
+    width = None if sys.stdout.isatty() else 110
+    Console(width=width, highlight=False).print(table)
+
+
+def print_metrics(title: str, metrics: Mapping[str, float | None]) -> None:
+    """Print a run's metrics with their meanings."""
+    from surgsim.metrics.catalog import METRICS
+
+    rows = [
+        (name, format_number(value, METRICS[name].digits), METRICS[name].meaning)
+        for name, value in metrics.items()
+    ]
+    print_table(title, ("metric", "value", "meaning"), rows, right=(1,))
+
+
+@contextmanager
+def show_progress(label: str, quiet: bool = False) -> Iterator[ProgressCall | None]:
+    """Progress of simulated time: a bar on a terminal, else a line every few seconds; both on stderr."""
+    if quiet:
+        yield None
+    elif sys.stderr.isatty():
+        yield from _bar(label)
+    else:
+        yield _Lines(label)
+
+
+def _bar(label: str) -> Iterator[ProgressCall]:
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        TextColumn("{task.completed:.1f}/{task.total:.1f} s  {task.fields[factor]}"),
+        TimeRemainingColumn(),
+    )
+    began = time.perf_counter()
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task(label, total=1.0, factor="")
+
+        def update(reached_s: float, duration_s: float) -> None:
+            factor = reached_s / max(time.perf_counter() - began, 1e-9)
+            bar.update(task, completed=reached_s, total=duration_s, factor=f"{factor:.1f}x real time")
+
+        yield update
+
+
+class _Lines:
+    """A plain line of progress every five seconds."""
+
+    def __init__(self, label: str) -> None:
+        self._label = label
+        self._began = self._last = time.perf_counter()
+
+    def __call__(self, reached_s: float, duration_s: float) -> None:
+        now = time.perf_counter()
+        if now - self._last >= 5.0:
+            self._last = now
+            factor = reached_s / (now - self._began)
+            text = f"{self._label}: {reached_s:.1f} of {duration_s:.1f} s, {factor:.1f}x real time"
+            print(text, file=sys.stderr, flush=True)

@@ -1,0 +1,53 @@
+"""`surgsim run`."""
+
+import argparse
+import sys
+from pathlib import Path
+
+from surgsim.cli.scenario_options import add_scenario_options
+
+HELP = "run a scenario and write its folder"
+EXAMPLES = """The folder holds scenario.yaml (every default explicit; running it again gives the same trace),
+metrics.json and recording.rrd. It appears when the run is whole.
+
+examples:
+  surgsim run circle_lwr4plus
+  surgsim run circle_lwr4plus --controller vprnn --seed 3 --out runs/mine
+  surgsim run circle_lwr4plus --set task.radius_m=0.03 --set trocar.position_m='[0, 0.55, 0.2]'
+  surgsim run my_scenario.yaml --json | jq .metrics.rcm_error_max_mm
+"""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the command's arguments."""
+    parser.add_argument("scenario", metavar="SCENARIO", help="a YAML file or the name of a shipped scenario")
+    add_scenario_options(parser)
+    parser.add_argument("--out", type=Path, metavar="DIR", help="the run's folder")
+    parser.add_argument("--no-record", action="store_true", help="write no recording.rrd")
+    parser.add_argument("--json", action="store_true", help="print metrics.json instead of a table")
+
+
+def execute(options: argparse.Namespace) -> int:
+    """Run the scenario; 0 when it completed."""
+    from surgsim.cli.output import print_metrics, show_progress
+    from surgsim.errors import Outcome
+    from surgsim.runs.folder import run_to_folder
+    from surgsim.scenario.load import load_scenario
+
+    scenario = load_scenario(
+        options.scenario, controller=options.controller, assignments=options.assignments, seed=options.seed
+    )
+    default = Path("runs") / scenario.name / f"{scenario.controller.name}-seed{scenario.seed}"
+    folder = options.out or default
+    with show_progress(f"{scenario.name} {scenario.controller.name}") as progress:
+        result = run_to_folder(scenario, folder, record=not options.no_record, progress=progress)
+    ending = result.trace.meta.ending
+    if options.json:
+        print((folder / "metrics.json").read_text(), end="")
+    else:
+        print_metrics(f"{scenario.name}, {scenario.controller.name}, seed {scenario.seed}", result.metrics)
+        detail = f" {ending.detail}." if ending.detail else ""
+        print(f"\n{ending.outcome.name.lower()} at {ending.t_s:.3f} s: {ending.outcome.value}{detail}")
+    speed = f"{result.wall_time_s:.1f} s, {result.real_time_factor:.1f}x real time"
+    print(f"simulated {ending.t_s:.1f} s in {speed}; wrote {folder}", file=sys.stderr)
+    return 0 if ending.outcome is Outcome.COMPLETED else 1

@@ -1,0 +1,17 @@
+"""Options that commands on scenarios share."""
+
+import argparse
+
+
+def add_scenario_options(parser: argparse.ArgumentParser) -> None:
+    """`--controller`, `--set` and `--seed`."""
+    parser.add_argument("--controller", metavar="NAME", help="controller instead of the scenario's own")
+    parser.add_argument(
+        "--set",
+        action="append",
+        default=[],
+        metavar="KEY.PATH=VALUE",
+        dest="assignments",
+        help="change one value; may be given again",
+    )
+    parser.add_argument("--seed", type=int, metavar="N", help="seed instead of the scenario's own")

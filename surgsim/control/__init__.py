@@ -1,0 +1,1 @@
+"""Controllers: a velocity-level redundancy resolver and a torque-level law."""

@@ -1,0 +1,36 @@
+"""Velocity-level null-space tools, for Jacobians of full row rank."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from surgsim.compiled import compiled
+from surgsim.control.problem import ControlFailure
+from surgsim.errors import Outcome
+
+Array = NDArray[np.float64]
+
+
+def least_velocity(J: Array, v: Array, qdot_0: Array | None = None) -> Array:
+    """Q' = pinv(J) v + (I - pinv(J) J) q'_0: the solution of J q' = v nearest to `qdot_0` (7,) [rad/s].
+
+    Raises:
+        ControlFailure: If J has lost rank.
+    """
+    try:
+        return _nearest(J, v, _ZERO if qdot_0 is None else qdot_0)
+    except np.linalg.LinAlgError as error:
+        raise ControlFailure(Outcome.INFEASIBLE, "the task Jacobian has lost rank") from error
+
+
+_ZERO = np.zeros(7)
+
+
+@compiled
+def _nearest(J: Array, v: Array, qdot_0: Array) -> Array:
+    return qdot_0 + J.T @ np.linalg.solve(J @ J.T, v - J @ qdot_0)
+
+
+@compiled
+def null_space_projection(J: Array, qdot: Array) -> Array:
+    """(I - pinv(J) J) q' (7,): the part of `qdot` that moves none of the rows of J."""
+    return qdot - J.T @ np.linalg.solve(J @ J.T, J @ qdot)

@@ -1,0 +1,137 @@
+"""The velocity-level problem that every resolver is given at a tick, and what it answers."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from surgsim.compiled import compiled
+from surgsim.control.rcm import Rcm
+from surgsim.errors import Outcome
+from surgsim.models.arm import Kinematics
+from surgsim.models.build import JointLimits
+from surgsim.tasks.base import TipCommand
+
+Array = NDArray[np.float64]
+
+
+class ControlFailure(Exception):
+    """The controller cannot give a command: the run ends with this outcome.
+
+    Attributes:
+        outcome: How the run ends.
+        detail: What the controller saw, for the person who looks into it.
+        data: Arrays that let the failure be examined, e.g. the infeasible QP.
+    """
+
+    def __init__(self, outcome: Outcome, detail: str, data: Mapping[str, Array] | None = None) -> None:
+        self.outcome = outcome
+        self.detail = detail
+        self.data = dict(data or {})
+        super().__init__(detail)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class VelocityProblem:
+    """Move the tip as commanded, keep the shaft in the trocar, stay inside the bounds.
+
+    Attributes:
+        t_s: Time since the controller started [s].
+        dt_s: Control period [s].
+        q: Joint positions at which the kinematics were evaluated (7,) [rad].
+        v: Joint velocities there (7,) [rad/s].
+        kin: Kinematics at `q`.
+        command: Desired tip motion.
+        rcm: RCM error and Jacobian, or None without a trocar.
+        p_WC: Trocar position (3,) [m], zeros without one.
+        lower: Lower velocity bounds Omega (7,) [rad/s].
+        upper: Upper velocity bounds Omega (7,) [rad/s].
+        limits: The arm's joint limits.
+    """
+
+    t_s: float
+    dt_s: float
+    q: Array
+    v: Array
+    kin: Kinematics
+    command: TipCommand
+    rcm: Rcm | None
+    p_WC: Array
+    lower: Array
+    upper: Array
+    limits: JointLimits
+
+    @property
+    def tip_error(self) -> Array:
+        """p_WT - p_WTd (3,) [m]."""
+        return self.kin.p_WT - self.command.p_WTd
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Resolution:
+    """A resolver's answer.
+
+    Attributes:
+        qdot: Joint velocities inside the bounds (7,) [rad/s].
+        residual: Norm of the task and RCM rows that `qdot` leaves unmet [m/s].
+    """
+
+    qdot: Array
+    residual: float
+
+
+def velocity_bounds(q: Array, limits: JointLimits, position_gain_per_s: float) -> tuple[Array, Array]:
+    """Omega of the VPRNN paper: velocity limits, tightened as a joint nears its position limit.
+
+    max(-v_max, -alpha (q - q_min)) <= q' <= min(v_max, alpha (q_max - q))
+
+    A joint already past its limit gets the bound that drives it back, capped by its velocity limit.
+
+    Returns:
+        Lower and upper bounds, each (7,) [rad/s].
+    """
+    return _velocity_bounds(q, limits.q_min, limits.q_max, limits.velocity, position_gain_per_s)
+
+
+@compiled
+def _velocity_bounds(
+    q: Array, q_min: Array, q_max: Array, velocity: Array, gain: float
+) -> tuple[Array, Array]:
+    lower = np.maximum(-velocity, gain * (q_min - q))
+    upper = np.minimum(velocity, gain * (q_max - q))
+    return np.minimum(lower, velocity), np.maximum(upper, -velocity)
+
+
+def stacked_rows(
+    problem: VelocityProblem, k_tip: float, k_rcm: float, *, rcm: bool = True
+) -> tuple[Array, Array]:
+    """Rows [J_T; J_rcm] (5, 7) and right side [v_d; v_rcm] (5,), eq. (20) of the VPRNN paper.
+
+    v_d = -k1 (p - p_d) + p_d', v_rcm = -k2 e + N C'. Without a trocar, or with `rcm` False, the three tip
+    rows alone.
+    """
+    v_d = problem.command.v_WTd - k_tip * problem.tip_error
+    shaft = problem.rcm
+    if shaft is None or not rcm:
+        return problem.kin.Jv_WT, v_d
+    v_rcm = shaft.trocar_velocity - k_rcm * shaft.error
+    return np.concatenate((problem.kin.Jv_WT, shaft.jacobian)), np.concatenate((v_d, v_rcm))
+
+
+def bounded_resolution(problem: VelocityProblem, qdot: Array, J: Array, rhs: Array) -> Resolution:
+    """`qdot` projected on the bounds, with the residual that this leaves in `J qdot = rhs`."""
+    inside, residual = _bounded(qdot, problem.lower, problem.upper, J, rhs)
+    return Resolution(qdot=inside, residual=residual)
+
+
+@compiled
+def _bounded(qdot: Array, lower: Array, upper: Array, J: Array, rhs: Array) -> tuple[Array, float]:
+    inside = np.minimum(np.maximum(qdot, lower), upper)
+    total = 0.0
+    for i in range(J.shape[0]):
+        row = -rhs[i]
+        for j in range(7):
+            row += J[i, j] * inside[j]
+        total += row * row
+    return inside, np.sqrt(total)

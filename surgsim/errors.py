@@ -1,0 +1,55 @@
+"""Errors that are the user's to mend, and how a run can end.
+
+The command line catches `SurgsimError` alone and prints it on one line; anything else is a bug and
+keeps its traceback.
+"""
+
+import difflib
+import enum
+from collections.abc import Iterable
+
+
+class SurgsimError(Exception):
+    """Something that the user can mend: bad input, a file that is damaged, a path out of reach."""
+
+
+class ScenarioError(SurgsimError):
+    """A scenario that cannot be run as written.
+
+    Attributes:
+        where: `file:line: key.path` or as much of it as is known.
+        reason: What is wrong, with the value and what is allowed.
+    """
+
+    def __init__(self, where: str, reason: str) -> None:
+        self.where = where
+        self.reason = reason
+        super().__init__(f"{where}: {reason}" if where else reason)
+
+
+class UnreachableError(SurgsimError):
+    """A start or path that the instrument cannot reach through the trocar."""
+
+
+class RecordingError(SurgsimError):
+    """A recording or run folder that is missing, damaged or not surgsim's."""
+
+
+def unknown_name(name: str, kind: str, known: Iterable[str]) -> str:
+    """Say that `name` is not a `kind`, list what is, and suggest the nearest match."""
+    names = sorted(known)
+    text = f"'{name}' is not a {kind}. Known: {', '.join(names) or 'none'}."
+    near = difflib.get_close_matches(name, names, n=1)
+    return f"{text} Did you mean '{near[0]}'?" if near else text
+
+
+class Outcome(enum.Enum):
+    """How a run ended. The value is the sentence that a person reads."""
+
+    COMPLETED = "The task ran to its end."
+    DIVERGED = "The simulation diverged: a state or torque is not finite."
+    JOINT_LIMIT = "A joint left its position range."
+    VELOCITY_LIMIT = "A joint moved faster than its velocity limit."
+    RCM_LIMIT = "The shaft moved further from the trocar than the incision allows."
+    TIP_LIMIT = "The tip left its path by more than the stated limit."
+    INFEASIBLE = "The controller found no command that meets its hard constraints."

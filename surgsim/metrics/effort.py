@@ -1,0 +1,65 @@
+"""How near the arm came to its limits, and how much the controller left unmet."""
+
+import numpy as np
+
+from surgsim.metrics.accuracy import rms
+from surgsim.metrics.metric import Metric
+from surgsim.trace.trace import Trace
+
+
+def joint_limit_margin_min_rad(trace: Trace) -> float:
+    """Smallest distance of any joint from its position limit [rad]; negative outside."""
+    q = trace.block("q")
+    low, high = np.array(trace.meta.limits["q_min"]), np.array(trace.meta.limits["q_max"])
+    return float(np.min(np.minimum(q - low, high - q)))
+
+
+def joint_velocity_ratio_max(trace: Trace) -> float:
+    """Largest |joint velocity| over its limit."""
+    return float(np.max(np.abs(trace.block("v")) / np.array(trace.meta.limits["velocity"])))
+
+
+def torque_ratio_max(trace: Trace) -> float:
+    """Largest |joint torque| over its limit; NaN on the kinematic plant."""
+    ratio = np.abs(trace.block("tau")) / np.array(trace.meta.limits["torque"])
+    return float(np.nanmax(ratio)) if np.isfinite(ratio).any() else float("nan")
+
+
+def saturated_fraction(trace: Trace) -> float:
+    """Fraction of ticks in which a commanded torque was cut at its limit; NaN on the kinematic plant."""
+    saturated = trace["saturated_joints"]
+    saturated = saturated[np.isfinite(saturated)]
+    return float(np.mean(saturated > 0)) if saturated.size else float("nan")
+
+
+def resolver_residual_rms(trace: Trace) -> float:
+    """RMS norm of the task and RCM rows that the resolver left unmet [m/s]."""
+    residual = trace["resolver_residual_m_per_s"]
+    residual = residual[np.isfinite(residual)]
+    return rms(residual) if residual.size else float("nan")
+
+
+METRICS = (
+    Metric(
+        name="joint_limit_margin_min_rad",
+        meaning="smallest distance of a joint from its position limit",
+        compute=joint_limit_margin_min_rad,
+        lower_is_better=False,
+    ),
+    Metric(
+        name="joint_velocity_ratio_max",
+        meaning="largest joint velocity over its limit",
+        compute=joint_velocity_ratio_max,
+    ),
+    Metric(name="torque_ratio_max", meaning="largest joint torque over its limit", compute=torque_ratio_max),
+    Metric(
+        name="saturated_fraction",
+        meaning="fraction of ticks with a torque cut at its limit",
+        compute=saturated_fraction,
+    ),
+    Metric(
+        name="resolver_residual_rms",
+        meaning="RMS of the velocity rows that the resolver left unmet, m/s",
+        compute=resolver_residual_rms,
+    ),
+)

@@ -1,0 +1,25 @@
+"""What a metric is."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from surgsim.trace.trace import Trace
+
+
+@dataclass(frozen=True, kw_only=True)
+class Metric:
+    """A named figure of a run.
+
+    Attributes:
+        name: Name with its unit suffix, as in `metrics.json`.
+        meaning: One line for a person.
+        compute: Value from a trace; NaN where the trace does not define it.
+        lower_is_better: Direction for rankings; None where there is none.
+        digits: Significant digits worth printing.
+    """
+
+    name: str
+    meaning: str
+    compute: Callable[[Trace], float]
+    lower_is_better: bool | None = True
+    digits: int = 4

@@ -1,0 +1,45 @@
+"""How long the controller took."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from surgsim.metrics.metric import Metric
+from surgsim.trace.trace import Trace
+
+
+def _times(trace: Trace) -> NDArray[np.float64]:
+    times = trace["control_time_s"]
+    return times[np.isfinite(times)]
+
+
+def control_time_percentile_us(trace: Trace, percentile: float) -> float:
+    """Percentile of the controller's wall time per tick [us]."""
+    times = _times(trace)
+    return 1e6 * float(np.percentile(times, percentile)) if times.size else float("nan")
+
+
+def deadline_miss_fraction(trace: Trace) -> float:
+    """Fraction of ticks in which the controller took longer than its period."""
+    times = _times(trace)
+    return float(np.mean(times > trace.meta.control_period_s)) if times.size else float("nan")
+
+
+METRICS = (
+    Metric(
+        name="control_time_p50_us",
+        meaning="median wall time of the controller per tick",
+        compute=lambda trace: control_time_percentile_us(trace, 50.0),
+    ),
+    Metric(
+        name="control_time_p99_us",
+        meaning="99th percentile of the controller's wall time per tick",
+        compute=lambda trace: control_time_percentile_us(trace, 99.0),
+    ),
+    Metric(
+        name="deadline_miss_fraction",
+        meaning="fraction of ticks in which the controller took longer than its period",
+        compute=deadline_miss_fraction,
+    ),
+)
+TIMING_METRICS = frozenset(metric.name for metric in METRICS)
+"""Metrics that measure the machine, not the experiment."""

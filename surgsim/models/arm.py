@@ -1,0 +1,136 @@
+"""The controller's knowledge of the arm: kinematics and dynamics of the nominal model.
+
+A controller never sees the plant's data. It evaluates its own copy of the robot and instrument, without
+the payload, friction or inertia errors that a scenario gives the plant.
+"""
+
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from surgsim.models.build import JointLimits, Scene, build_arm
+from surgsim.models.config import SceneConfig
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Kinematics:
+    """First-order kinematics of tip and shaft at one configuration, in the world frame.
+
+    Attributes:
+        p_WT: Tip position (3,) [m].
+        R_WT: Tip orientation (3, 3); its third column is the shaft axis, from adapter to tip.
+        Jv_WT: Translational tip Jacobian (3, 7) [m/rad].
+        Jw_WT: Rotational tip Jacobian (3, 7) [-].
+        z_W: Joint axes as rows (7, 3), unit.
+    """
+
+    p_WT: Array
+    R_WT: Array
+    Jv_WT: Array
+    Jw_WT: Array
+    z_W: Array
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Dynamics:
+    """Rigid-body dynamics at one state: M q'' + bias = tau - damping * v.
+
+    Attributes:
+        mass_matrix: Joint-space inertia with armature (7, 7) [kg m^2].
+        bias: Coriolis, centrifugal and gravity torque (7,) [N m].
+        gravity: Gravity torque alone (7,) [N m].
+        Jv_dot_v: Tip acceleration at zero joint acceleration (3,) [m/s^2].
+        Jw_dot_v: Angular acceleration of the shaft at zero joint acceleration (3,) [rad/s^2].
+    """
+
+    mass_matrix: Array
+    bias: Array
+    gravity: Array
+    Jv_dot_v: Array
+    Jw_dot_v: Array
+
+
+class ArmModel:
+    """Nominal robot with its instrument; evaluates `Kinematics` and `Dynamics` anywhere.
+
+    Evaluations share one scratch `MjData`, so an instance belongs to one thread.
+    """
+
+    def __init__(self, config: SceneConfig) -> None:
+        self._scene: Scene = build_arm(config)
+        self._model = self._scene.model
+        self._data = mujoco.MjData(self._model)
+        self._jacp = np.zeros((3, 7))
+        self._jacr = np.zeros((3, 7))
+        self._full = np.zeros((7, 7))
+
+    @property
+    def scene(self) -> Scene:
+        """The compiled nominal scene."""
+        return self._scene
+
+    @property
+    def limits(self) -> JointLimits:
+        """Joint position, velocity, acceleration and torque limits."""
+        return self._scene.limits
+
+    @property
+    def damping(self) -> Array:
+        """Viscous joint damping of the nominal model (7,) [N m s/rad]."""
+        return np.array(self._model.dof_damping, dtype=float)
+
+    def kinematics(self, q: Array) -> Kinematics:
+        """Kinematics at joint positions `q` (7,) [rad]."""
+        self._place(q)
+        return self._read_kinematics()
+
+    def dynamics(self, q: Array, v: Array) -> Dynamics:
+        """Dynamics at joint positions `q` (7,) [rad] and velocities `v` (7,) [rad/s]."""
+        self._place(q)
+        return self._read_dynamics(v)
+
+    def evaluate(self, q: Array, v: Array) -> tuple[Kinematics, Dynamics]:
+        """Both at once, for one placement of the model."""
+        self._place(q)
+        return self._read_kinematics(), self._read_dynamics(v)
+
+    def _place(self, q: Array) -> None:
+        self._data.qpos[:] = q
+        mujoco.mj_kinematics(self._model, self._data)
+        mujoco.mj_comPos(self._model, self._data)
+
+    def _read_kinematics(self) -> Kinematics:
+        data, site = self._data, self._scene.tip_site
+        mujoco.mj_jacSite(self._model, data, self._jacp, self._jacr, site)
+        return Kinematics(
+            p_WT=data.site_xpos[site].copy(),
+            R_WT=data.site_xmat[site].reshape(3, 3).copy(),
+            Jv_WT=self._jacp.copy(),
+            Jw_WT=self._jacr.copy(),
+            z_W=data.xaxis.copy(),
+        )
+
+    def _read_dynamics(self, v: Array) -> Dynamics:
+        model, data, site = self._model, self._data, self._scene.tip_site
+        gravity, bias = np.zeros(7), np.zeros(7)
+        data.qvel[:] = 0.0
+        mujoco.mj_comVel(model, data)
+        mujoco.mj_rne(model, data, 0, gravity)
+        data.qvel[:] = v
+        mujoco.mj_comVel(model, data)
+        mujoco.mj_rne(model, data, 0, bias)
+        mujoco.mj_makeM(model, data)
+        mujoco.mj_fullM(model, data, self._full)
+        body = int(model.site_bodyid[site])
+        mujoco.mj_jacDot(model, data, self._jacp, self._jacr, data.site_xpos[site], body)
+        return Dynamics(
+            mass_matrix=self._full.copy(),
+            bias=bias,
+            gravity=gravity,
+            Jv_dot_v=self._jacp @ v,
+            Jw_dot_v=self._jacr @ v,
+        )

@@ -1,0 +1,133 @@
+"""Composition of a scene from its config, and the names in it resolved to ids once."""
+
+import hashlib
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from surgsim.models.config import RobotConfig, SceneConfig
+from surgsim.models.graft import graft
+from surgsim.models.instrument import attach_instrument
+from surgsim.models.robot import JOINTS, MOTORS, JointLimits, robot_spec
+from surgsim.models.theatre import about_z, attach_patient, attach_port, room_spec
+
+__all__ = ["JointLimits", "Scene", "SpecModifier", "build", "build_arm"]
+
+GRAVITY_M_PER_S2 = 9.81
+Ids = NDArray[np.intp]
+
+
+class SpecModifier(Protocol):
+    """Changes the scene before it is compiled: an unknown payload, friction, wrong inertia."""
+
+    def modify(self, spec: mujoco.MjSpec) -> None:
+        """Change `spec` in place."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Scene:
+    """A compiled model and its ids. The model must not be changed.
+
+    Attributes:
+        model: The compiled MuJoCo model.
+        spec_sha256: Hash of the MJCF that it was compiled from.
+        qpos_ids: Where the arm's positions are in `qpos` (7,).
+        dof_ids: Where its velocities are in `qvel` (7,).
+        actuator_ids: Where its motors are in `ctrl` (7,).
+        flange_site: Flange, z along the tool.
+        tip_site: Instrument tip, z along the shaft; the flange without an instrument.
+        shaft_entry_site: Start of the shaft, a second point of its axis; the wrist without an instrument.
+        trocar_site: Remote centre of motion, z out of the patient.
+        port_mocap: Row of the port in `mocap_pos`.
+        limits: What the joints can do.
+    """
+
+    model: mujoco.MjModel
+    spec_sha256: str
+    qpos_ids: Ids
+    dof_ids: Ids
+    actuator_ids: Ids
+    flange_site: int
+    tip_site: int
+    shaft_entry_site: int
+    trocar_site: int | None
+    port_mocap: int | None
+    limits: JointLimits
+
+
+def build(config: SceneConfig, modifiers: Sequence[SpecModifier] = (), *, drawn: bool = True) -> Scene:
+    """The whole scene: arm, instrument, port and, if wanted, the theatre.
+
+    Args:
+        config: What is in the scene.
+        modifiers: Applied in order to the whole composition before it is compiled.
+        drawn: False leaves out what is only looked at; the mechanics are the same and step faster.
+
+    Raises:
+        SurgsimError: If the robot is unknown or the instrument's parameters contradict each other.
+    """
+    theatre = config.theatre and drawn
+    spec = room_spec(config) if theatre else mujoco.MjSpec()
+    spec.compiler.discardvisual = not drawn
+    _add_arm(spec, config)
+    if config.trocar is not None:
+        attach_port(spec, config.trocar)
+        if theatre:
+            attach_patient(spec, config, config.trocar)
+    for modifier in modifiers:
+        modifier.modify(spec)
+    return _compile(spec)
+
+
+def build_arm(config: SceneConfig) -> Scene:
+    """Robot and instrument alone, without drawings: the controller's nominal model.
+
+    Raises:
+        SurgsimError: As `build`.
+    """
+    spec = mujoco.MjSpec()
+    spec.compiler.discardvisual = True
+    _add_arm(spec, config)
+    return _compile(spec)
+
+
+def _add_arm(spec: mujoco.MjSpec, config: SceneConfig) -> None:
+    spec.option.timestep = config.timestep_s
+    spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    spec.option.gravity = [0.0, 0.0, -GRAVITY_M_PER_S2]
+    arm = robot_spec(config.robot.name)
+    attach_instrument(arm, config.instrument)
+    graft(spec, arm, frame=_base_frame(spec, config.robot))
+
+
+def _base_frame(spec: mujoco.MjSpec, robot: RobotConfig) -> mujoco.MjsFrame:
+    return spec.worldbody.add_frame(pos=robot.base_position_m, quat=about_z(robot.base_yaw_rad))
+
+
+def _compile(spec: mujoco.MjSpec) -> Scene:
+    model = spec.compile()
+    joints = [model.joint(name) for name in JOINTS]
+    port = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, "port")
+    return Scene(
+        model=model,
+        spec_sha256=hashlib.sha256(spec.to_xml().encode()).hexdigest(),
+        qpos_ids=_ids([joint.qposadr[0] for joint in joints]),
+        dof_ids=_ids([joint.dofadr[0] for joint in joints]),
+        actuator_ids=_ids([model.actuator(name).id for name in MOTORS]),
+        flange_site=model.site("flange").id,
+        tip_site=model.site("tip").id,
+        shaft_entry_site=model.site("shaft_entry").id,
+        trocar_site=model.site("trocar").id if port >= 0 else None,
+        port_mocap=int(model.body_mocapid[port]) if port >= 0 else None,
+        limits=JointLimits.of(model),
+    )
+
+
+def _ids(values: list[int]) -> Ids:
+    ids = np.array(values, dtype=np.intp)
+    ids.flags.writeable = False
+    return ids

@@ -1,0 +1,93 @@
+"""The instrument on the flange, and the two sites that say where its shaft and tip are."""
+
+import mujoco
+import numpy as np
+
+from surgsim.errors import SurgsimError
+from surgsim.models.config import InstrumentConfig
+from surgsim.models.graft import asset, graft
+from surgsim.spatial import Array
+
+_DRAWN_DIAMETER_M = 0.008  # the template's jaws are drawn for this shaft
+_JAWS_M = 0.018  # of the shaft's length, for an 8 mm shaft
+
+
+def attach_instrument(arm: mujoco.MjSpec, config: InstrumentConfig | None) -> None:
+    """Put the instrument on site `flange` of `arm`, with sites `shaft_entry` and `tip`.
+
+    Both sites have z along the shaft, towards the tip. `shaft_entry` is the end of the adapter. Without an
+    instrument `tip` is the flange and `shaft_entry` the wrist centre (the origin of link7).
+    """
+    if config is None:
+        flange = arm.site("flange")
+        arm.body("link7").add_site(name="shaft_entry", quat=flange.quat, group=4)
+        arm.body("link7").add_site(name="tip", pos=flange.pos, quat=flange.quat, group=4)
+    else:
+        graft(arm, instrument_spec(config), site=arm.site("flange"))
+
+
+def instrument_spec(config: InstrumentConfig) -> mujoco.MjSpec:
+    """The shipped template with the sizes and the inertia of `config`; origin at the flange, z to the tip."""
+    spec = asset(f"instruments/{config.type}.xml")
+    _set_inertia(spec.body("instrument"), config)
+    _set_sizes(spec, config)
+    return spec
+
+
+def rod_masses(config: InstrumentConfig) -> tuple[float, float]:
+    """Masses (adapter, shaft) [kg] of two uniform rods with the mass and centre of mass of `config`.
+
+    m_a + m_s = m and m_a a/2 + m_s (a + s/2) = m c, with adapter length a, shaft length s, centre of mass c.
+
+    Raises:
+        SurgsimError: If `com_m` lies outside the two rods' centres, so that a mass would be negative.
+    """
+    a, s = config.adapter_length_m, config.shaft_length_m
+    low, high = a / 2, a + s / 2
+    if not low <= config.com_m <= high:
+        raise SurgsimError(
+            f"instrument: com_m is {config.com_m:g}; an adapter of {a:g} m and a shaft of {s:g} m allow "
+            f"{low:g} (all mass in the adapter) to {high:g} (all in the shaft)"
+        )
+    shaft = config.mass_kg * (config.com_m - low) / (high - low)
+    return config.mass_kg - shaft, shaft
+
+
+def rod_inertia(config: InstrumentConfig, adapter_radius_m: float) -> Array:
+    """Principal inertia (3,) [kg m²] about the centre of mass of the two rods of `rod_masses`.
+
+    A solid cylinder of mass m, length l, radius r at distance d from the centre of mass adds
+    m (3 r² + l²)/12 + m d² across and m r²/2 along the shaft: physically consistent by construction.
+    """
+    a, s = config.adapter_length_m, config.shaft_length_m
+    m = np.array(rod_masses(config))
+    length = np.array([a, s])
+    radius = np.array([adapter_radius_m, config.shaft_diameter_m / 2])
+    offset = np.array([a / 2, a + s / 2]) - config.com_m
+    across = float(np.sum(m * ((3 * radius**2 + length**2) / 12 + offset**2)))
+    along = float(np.sum(m * radius**2 / 2))
+    return np.array([across, across, along])
+
+
+def _set_inertia(body: mujoco.MjsBody, config: InstrumentConfig) -> None:
+    radius = float(next(geom for geom in body.geoms if geom.name == "adapter").size[0])
+    body.mass = config.mass_kg
+    body.ipos = [0.0, 0.0, config.com_m]
+    body.inertia = rod_inertia(config, radius)
+
+
+def _set_sizes(spec: mujoco.MjSpec, config: InstrumentConfig) -> None:
+    a, s = config.adapter_length_m, config.shaft_length_m
+    scale = config.shaft_diameter_m / _DRAWN_DIAMETER_M
+    drawn = s - _JAWS_M * scale
+    adapter, band, shaft = (spec.geom(name) for name in ("adapter", "adapter_band", "shaft"))
+    adapter.pos, adapter.size = [0, 0, a / 2], [adapter.size[0], a / 2, 0]
+    band.pos = [0, 0, 0.85 * a]
+    band.size = [band.size[0], 0.075 * a, 0]
+    shaft.pos, shaft.size = [0, 0, a + drawn / 2], [config.shaft_diameter_m / 2, drawn / 2, 0]
+    spec.site("shaft_entry").pos = [0, 0, a]
+    spec.site("tip").pos = spec.body("jaws").pos = [0, 0, a + s]
+    for geom in spec.body("jaws").geoms:
+        geom.pos, geom.size = geom.pos * scale, geom.size * scale
+    jaw = spec.mesh("jaw")
+    jaw.scale = jaw.scale * scale

@@ -1,0 +1,77 @@
+"""The arms: where their models are and what their limits are.
+
+A robot is a folder `assets/<name>/` with `<name>.xml`, an MJCF that holds nothing but the arm: bodies
+`base`, `link1`..`link7`, joints `joint1`..`joint7`, torque motors `motor1`..`motor7` whose ctrlrange is
+the torque limit, a site `flange` whose z is the tool axis, and the numerics `velocity_limit_rad_per_s`
+and `acceleration_limit_rad_per_s2`, which MJCF has no attribute for.
+"""
+
+from dataclasses import dataclass
+from typing import Self
+
+import mujoco
+import numpy as np
+from numpy.typing import ArrayLike
+
+from surgsim.errors import SurgsimError, unknown_name
+from surgsim.models.graft import asset
+from surgsim.resources import resource_dir
+from surgsim.spatial import Array
+
+JOINTS = tuple(f"joint{i}" for i in range(1, 8))
+MOTORS = tuple(f"motor{i}" for i in range(1, 8))
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class JointLimits:
+    """What the joints can do. Arrays (7,), read-only.
+
+    Attributes:
+        q_min: Lowest position [rad].
+        q_max: Highest position [rad].
+        velocity: Largest speed either way [rad/s].
+        acceleration: Largest acceleration either way [rad/s²].
+        torque: Largest motor torque either way [N m].
+    """
+
+    q_min: Array
+    q_max: Array
+    velocity: Array
+    acceleration: Array
+    torque: Array
+
+    @classmethod
+    def of(cls, model: mujoco.MjModel) -> Self:
+        """Limits that the compiled `model` states."""
+        positions = np.array([model.joint(name).range for name in JOINTS])
+        torques = np.array([model.actuator(name).ctrlrange for name in MOTORS])
+        return cls(
+            q_min=_frozen(positions[:, 0]),
+            q_max=_frozen(positions[:, 1]),
+            velocity=_frozen(model.numeric("velocity_limit_rad_per_s").data),
+            acceleration=_frozen(model.numeric("acceleration_limit_rad_per_s2").data),
+            torque=_frozen(torques[:, 1]),
+        )
+
+
+def robot_names() -> list[str]:
+    """Names of the shipped robots, sorted."""
+    folders = resource_dir("assets").iterdir()
+    return sorted(folder.name for folder in folders if (folder / f"{folder.name}.xml").is_file())
+
+
+def robot_spec(name: str) -> mujoco.MjSpec:
+    """The arm alone, its base at the origin.
+
+    Raises:
+        SurgsimError: If there is no such robot.
+    """
+    if name not in robot_names():
+        raise SurgsimError(unknown_name(name, "robot", robot_names()))
+    return asset(f"{name}/{name}.xml")
+
+
+def _frozen(values: ArrayLike) -> Array:
+    copy = np.array(values, dtype=np.float64)
+    copy.flags.writeable = False
+    return copy

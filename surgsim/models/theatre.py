@@ -1,0 +1,105 @@
+"""What stands around the arm: the room, the patient on the table, and the trocar port in the skin."""
+
+import math
+
+import mujoco
+import numpy as np
+
+from surgsim.models.config import SceneConfig, TrocarConfig
+from surgsim.models.graft import asset, graft
+from surgsim.models.surfaces import drape_mesh, inward_ellipsoid
+from surgsim.spatial import Array, unit
+
+_FREE_VIEW_M = np.array([0.5, 0.0, 0.25])  # where the cameras look when there is no trocar, from the base
+_TUBE_INNER_SHARE = 0.88  # inner radius of the mesh `tube` before scaling
+
+
+def room_spec(config: SceneConfig) -> mujoco.MjSpec:
+    """Floor, pedestal, lamp and the cameras `overview` and `port_closeup`, turned towards the trocar."""
+    spec = asset("theatre/room.xml")
+    base = np.array(config.robot.base_position_m)
+    spec.frame("room").pos = base
+    spec.frame("view").pos = _focus(config)
+    spec.frame("room").quat = spec.frame("view").quat = about_z(_heading(config))
+    return spec
+
+
+def attach_port(scene: mujoco.MjSpec, trocar: TrocarConfig) -> None:
+    """Add the mocap body `port` with site `trocar` at its centre, z out of the patient."""
+    spec = asset("trocar/port.xml")
+    tube = spec.mesh("tube")
+    radius = trocar.bore_diameter_m / 2 / _TUBE_INNER_SHARE
+    tube.scale = [radius, radius, tube.scale[2]]
+    port = spec.body("port")
+    port.pos = trocar.position_m
+    port.quat = _z_to(unit(np.array(trocar.axis)))
+    graft(scene, spec, frame=scene.worldbody.add_frame())
+
+
+def attach_patient(scene: mujoco.MjSpec, config: SceneConfig, trocar: TrocarConfig) -> None:
+    """Add patient and table so that the abdomen's skin passes through the trocar, normal to its axis."""
+    spec = asset("theatre/patient.xml")
+    heading = _heading(config)
+    axis = _rotated(unit(np.array(trocar.axis)), -heading)
+    skin = _ellipsoid_point(np.array(spec.geom("abdomen").size), axis)
+    centre = np.array(trocar.position_m) - _rotated(skin, heading)
+    patient = spec.body("patient")
+    patient.pos, patient.quat = centre, about_z(heading)
+    floor = config.robot.base_position_m[2] + float(scene.geom("floor").pos[2])
+    _cover(spec)
+    _stand_on(spec, floor - float(centre[2]))
+    graft(scene, spec, frame=scene.worldbody.add_frame())
+
+
+def _cover(spec: mujoco.MjSpec) -> None:
+    """Fill in the meshes `drape` and `lining`, which follow the abdomen's size."""
+    abdomen = np.array(spec.geom("abdomen").size)
+    surfaces = {"drape": drape_mesh(abdomen), "lining": inward_ellipsoid(abdomen - 0.002)}
+    for name, (vertices, faces) in surfaces.items():
+        mesh = spec.mesh(name)
+        mesh.uservert, mesh.userface = vertices.ravel(), faces.ravel()
+
+
+def _stand_on(spec: mujoco.MjSpec, floor: float) -> None:
+    """Put the table's foot on the floor (a height in the patient's frame) and its column on the foot."""
+    foot, column = spec.geom("foot"), spec.geom("column")
+    top = column.pos[2] + column.size[2]
+    bottom = min(floor + 2 * foot.size[2], top - 0.02)
+    foot.pos = [*foot.pos[:2], bottom - foot.size[2]]
+    column.pos = [*column.pos[:2], (top + bottom) / 2]
+    column.size = [*column.size[:2], (top - bottom) / 2]
+
+
+def _ellipsoid_point(semi_axes: Array, normal: Array) -> Array:
+    """Point of an ellipsoid about the origin whose outward unit normal is `normal`: A²n / sqrt(nᵀA²n)."""
+    stretched = semi_axes**2 * normal
+    return stretched / math.sqrt(float(normal @ stretched))
+
+
+def _focus(config: SceneConfig) -> Array:
+    if config.trocar is not None:
+        return np.array(config.trocar.position_m)
+    return np.array(config.robot.base_position_m) + _rotated(_FREE_VIEW_M, config.robot.base_yaw_rad)
+
+
+def _heading(config: SceneConfig) -> float:
+    """Angle about z of the horizontal direction from the robot's base to the focus [rad]."""
+    away = _focus(config) - np.array(config.robot.base_position_m)
+    return math.atan2(away[1], away[0])
+
+
+def _rotated(vector: Array, angle: float) -> Array:
+    c, s = math.cos(angle), math.sin(angle)
+    return np.array([c * vector[0] - s * vector[1], s * vector[0] + c * vector[1], vector[2]])
+
+
+def about_z(angle: float) -> Array:
+    """Quaternion (wxyz) of a turn by `angle` [rad] about z."""
+    return np.array([math.cos(angle / 2), 0.0, 0.0, math.sin(angle / 2)])
+
+
+def _z_to(direction: Array) -> Array:
+    """Quaternion (wxyz) of the shortest turn of the z axis to the unit vector `direction`."""
+    quat = np.zeros(4)
+    mujoco.mju_quatZ2Vec(quat, direction)
+    return quat

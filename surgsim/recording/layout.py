@@ -1,0 +1,95 @@
+"""What a recording file holds where, and the header that makes a trace of its columns again."""
+
+import hashlib
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from surgsim.trace.trace import Array, Block, Trace, TraceMeta
+
+APPLICATION = "surgsim"
+SCHEMA_VERSION = 1
+TIMELINE = "sim_time"
+FILE_NAME = "recording.rrd"
+HEADER = "surgsim"
+SEAL = "sha256"
+SERIES = "trace"
+LIMITS = "trace_limits"  # sorts after `trace`: legends name the joints first
+ERRORS = "errors_mm"
+SCENE = "scene"
+SUMMARY = "summary"
+LOG = "log"
+
+
+def series_path(block: str) -> str:
+    """Entity of a block of the trace, e.g. `trace/q`."""
+    return f"{SERIES}/{block.strip('_')}"
+
+
+def timestamps(t_s: Array) -> np.ndarray[tuple[int], np.dtype[np.timedelta64]]:
+    """Times (n,) [s] on the recording's timeline, whole nanoseconds."""
+    times: np.ndarray[tuple[int], np.dtype[np.timedelta64]] = np.rint(1e9 * t_s).astype("timedelta64[ns]")
+    return times
+
+
+def seal(data: Array, texts: Mapping[str, str]) -> str:
+    """SHA-256 of named texts and of the shape and the bytes of `data` (rows, columns)."""
+    sha = hashlib.sha256(json.dumps([data.shape, sorted(texts.items())]).encode())
+    sha.update(np.ascontiguousarray(data, dtype="<f8").tobytes())
+    return sha.hexdigest()
+
+
+@dataclass(frozen=True, kw_only=True)
+class Header:
+    """Stored beside the columns; enough to rebuild the trace and to notice damage.
+
+    Attributes:
+        meta: The trace's meta data.
+        metrics: Metrics at the time of writing; None where one does not apply.
+        blocks: The trace's columns, in order.
+        rows: Number of control ticks.
+    """
+
+    meta: TraceMeta
+    metrics: Mapping[str, float | None]
+    blocks: tuple[Block, ...]
+    rows: int
+
+    @staticmethod
+    def of(trace: Trace, metrics: Mapping[str, float | None]) -> "Header":
+        """The header that belongs to `trace`."""
+        return Header(meta=trace.meta, metrics=metrics, blocks=trace.blocks, rows=len(trace))
+
+    def to_texts(self) -> dict[str, str]:
+        """The header as named texts."""
+        blocks = [[block.name, list(block.labels), block.unit] for block in self.blocks]
+        return {
+            "schema_version": str(SCHEMA_VERSION),
+            "trace_meta": self.meta.to_json(),
+            "metrics": json.dumps(dict(self.metrics), sort_keys=True),
+            "layout": json.dumps({"blocks": blocks, "rows": self.rows}, sort_keys=True),
+        }
+
+    @staticmethod
+    def from_texts(texts: Mapping[str, str]) -> "Header":
+        """Inverse of `to_texts`.
+
+        Raises:
+            ValueError: If the texts are not those of a header of this version.
+        """
+        version = texts.get("schema_version")
+        if version != str(SCHEMA_VERSION):
+            raise ValueError(f"recording of schema version {version}; this surgsim reads {SCHEMA_VERSION}")
+        try:
+            layout = json.loads(texts["layout"])
+            metrics = json.loads(texts["metrics"])
+            return Header(
+                meta=TraceMeta.from_json(texts["trace_meta"]),
+                metrics={str(k): None if v is None else float(v) for k, v in metrics.items()},
+                blocks=tuple(Block(str(n), tuple(map(str, ls)), str(u)) for n, ls, u in layout["blocks"]),
+                rows=int(layout["rows"]),
+            )
+        except (KeyError, TypeError, AttributeError, ValueError) as error:
+            raise ValueError(f"damaged recording: header: {error}") from error

@@ -1,0 +1,12 @@
+"""Colours that people with a colour vision deficiency can tell apart (Okabe and Ito 2008), RGB."""
+
+ORANGE = (230, 159, 0)
+SKY = (86, 180, 233)
+GREEN = (0, 158, 115)
+YELLOW = (240, 228, 66)
+BLUE = (0, 114, 178)
+VERMILION = (213, 94, 0)
+PINK = (204, 121, 167)
+GREY = (150, 150, 150)
+
+SEVEN = (ORANGE, SKY, GREEN, YELLOW, BLUE, VERMILION, PINK)

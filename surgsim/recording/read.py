@@ -1,0 +1,72 @@
+"""Reading a recording back: the trace bit for bit, or a clear refusal."""
+
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from surgsim.errors import RecordingError
+from surgsim.recording.framing import check_framing, recording_file
+from surgsim.recording.layout import SEAL, Header, seal
+from surgsim.trace.trace import Array, Trace
+
+_TIMEOUT_S = 120.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class Recorded:
+    """What a recording holds.
+
+    Attributes:
+        trace: The run.
+        metrics: Metrics that were stored with it; None where one does not apply.
+    """
+
+    trace: Trace
+    metrics: Mapping[str, float | None]
+
+
+def read_recording(path: Path) -> Recorded:
+    """Read a recording, or the one in a run's folder.
+
+    Raises:
+        RecordingError: If there is none, it is damaged or cut short, or surgsim did not write it.
+    """
+    file = recording_file(path)
+    check_framing(file)
+    texts, data = _parse(file, _extract(file))
+    sha256 = texts.pop(SEAL, None)
+    if seal(data, texts) != sha256:
+        raise RecordingError(f"{file}: damaged recording: it does not hold what was written")
+    header = Header.from_texts(texts)
+    return Recorded(trace=Trace(data, header.blocks, header.meta), metrics=header.metrics)
+
+
+def _extract(file: Path) -> bytes:
+    """What `surgsim.recording.extract`, run as a program of its own, says of the file."""
+    command = [sys.executable, "-P", "-m", "surgsim.recording.extract", str(file)]
+    paths = {**os.environ, "PYTHONPATH": os.pathsep.join(entry or os.getcwd() for entry in sys.path)}
+    try:
+        done = subprocess.run(command, env=paths, capture_output=True, timeout=_TIMEOUT_S, check=False)
+    except subprocess.TimeoutExpired as error:
+        raise RecordingError(f"{file}: damaged recording: not read after {_TIMEOUT_S:g} s") from error
+    if done.returncode != 0:
+        reason = done.stderr.decode(errors="replace")
+        if "ModuleNotFoundError" in reason:
+            raise RecordingError(f"{file}: cannot be read: {reason.strip().splitlines()[-1]}")
+        raise RecordingError(f"{file}: damaged recording: rerun cannot read it")
+    return done.stdout
+
+
+def _parse(file: Path, answer: bytes) -> tuple[dict[str, str], Array]:
+    """Texts of the header and columns (rows, columns)."""
+    line, _, values = answer.partition(b"\n")
+    found = json.loads(line)
+    if "error" in found:
+        raise RecordingError(found["error"])
+    return found["texts"], np.frombuffer(values, dtype=np.float64).reshape(found["shape"])

@@ -1,0 +1,193 @@
+"""The 3-D scene of a recording, rebuilt from the scenario and the joint positions of the trace."""
+
+import json
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+import rerun as rr
+
+from surgsim.models.build import Scene, build
+from surgsim.recording import palette
+from surgsim.recording.layout import SCENE, TIMELINE, timestamps
+from surgsim.recording.shapes import Triangles, geom_triangles, joined
+from surgsim.scenario.schema import Scenario
+from surgsim.trace.trace import Array, Trace
+
+RCM_ARROW_SCALE = 10.0
+_DRAWN_GROUPS = 3  # MuJoCo shows geom groups 0 to 2 and keeps collision shapes in 3
+_POINTS_PER_LINE = 2000
+
+
+def scenario_of(trace: Trace) -> Scenario:
+    """The scenario that `trace` was made from."""
+    return Scenario.model_validate_json(json.dumps(trace.meta.scenario))
+
+
+def rebuild(scenario: Scenario) -> Scene:
+    """The scene that was simulated, disturbances included."""
+    return build(scenario.scene, [config.build() for config in scenario.disturbances])
+
+
+def log_scene(stream: rr.RecordingStream, scenario: Scenario, trace: Trace) -> None:
+    """Draw the theatre, the moving bodies, both paths, the tip and the RCM error."""
+    scene = rebuild(scenario)
+    stream.log(SCENE, rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
+    rows = sampled_rows(len(trace), scenario.recording.scene_rate_hz * trace.meta.control_period_s)
+    poses = body_poses(scene, trace, rows)
+    for body, surfaces in _surfaces(scene.model).items():
+        path = f"{SCENE}/{scene.model.body(body).name}"
+        _log_pose(stream, path, trace["t_s"][rows], poses, body)
+        for name, (surface, rgba) in surfaces.items():
+            stream.log(f"{path}/{name}", _mesh(surface, rgba), static=True)
+    _log_paths(stream, trace)
+    _log_points(stream, trace, rows)
+
+
+def sampled_rows(count: int, samples_per_tick: float) -> np.ndarray[tuple[int], np.dtype[np.intp]]:
+    """Rows at the scene's rate, always with the first and the last one."""
+    step = max(1, round(1.0 / samples_per_tick))
+    rows: np.ndarray[tuple[int], np.dtype[np.intp]] = np.unique(
+        np.append(np.arange(0, count, step), count - 1)
+    ).astype(np.intp)
+    return rows
+
+
+@dataclass(frozen=True, eq=False)
+class Poses:
+    """World poses of all bodies at the sampled rows.
+
+    Attributes:
+        position: Origins (rows, bodies, 3) [m].
+        quaternion: Orientations (rows, bodies, 4), wxyz.
+    """
+
+    position: Array
+    quaternion: Array
+
+
+def body_poses(scene: Scene, trace: Trace, rows: np.ndarray[tuple[int], np.dtype[np.intp]]) -> Poses:
+    """Forward kinematics at `rows` of the trace; the port follows the trocar."""
+    model = scene.model
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    q, trocar = trace.block("q")[rows], trace.block("trocar")[rows]
+    port = None if scene.port_mocap is None else data.mocap_pos[scene.port_mocap]
+    offset = np.zeros(3) if port is None else port - data.site_xpos[scene.trocar_site]
+    position = np.empty((len(rows), model.nbody, 3))
+    quaternion = np.empty((len(rows), model.nbody, 4))
+    for i in range(len(rows)):
+        data.qpos[scene.qpos_ids] = q[i]
+        if port is not None:
+            port[:] = trocar[i] + offset
+        mujoco.mj_kinematics(model, data)
+        position[i], quaternion[i] = data.xpos, data.xquat
+    return Poses(position, quaternion)
+
+
+def _surfaces(model: mujoco.MjModel) -> dict[int, dict[str, tuple[Triangles, Array]]]:
+    """Per body the drawn geoms, those of one material joined, by the material's name."""
+    found: dict[int, dict[str, tuple[list[Triangles], Array]]] = {}
+    for geom in range(model.ngeom):
+        material = int(model.geom_matid[geom])
+        rgba = model.mat_rgba[material] if material >= 0 else model.geom_rgba[geom]
+        triangles = geom_triangles(model, geom)
+        if model.geom_group[geom] >= _DRAWN_GROUPS or rgba[3] == 0.0 or triangles is None:
+            continue
+        name = model.mat(material).name.split("/")[-1] if material >= 0 else f"geom{geom}"
+        parts = found.setdefault(int(model.geom_bodyid[geom]), {})
+        parts.setdefault(name, ([], _shown(model, material, rgba)))[0].append(triangles)
+    return {
+        body: {name: (joined(parts), rgba) for name, (parts, rgba) in by_name.items()}
+        for body, by_name in found.items()
+    }
+
+
+def _shown(model: mujoco.MjModel, material: int, rgba: Array) -> Array:
+    """Colour (4,) to draw with: a textured material's mean colour, else its own."""
+    texture = int(model.mat_texid[material][mujoco.mjtTextureRole.mjTEXROLE_RGB]) if material >= 0 else -1
+    if texture < 0:
+        return np.array(rgba, dtype=np.float64)
+    channels = int(model.tex_nchannel[texture])
+    size = int(model.tex_height[texture]) * int(model.tex_width[texture]) * channels
+    texels = model.tex_data[model.tex_adr[texture] :][:size].reshape(-1, channels)
+    return np.array([*(texels[:, :3].mean(axis=0) / 255.0 * rgba[:3]), rgba[3]])
+
+
+def _mesh(surface: Triangles, rgba: Array) -> rr.Mesh3D:
+    return rr.Mesh3D(
+        vertex_positions=surface.points.astype(np.float32),
+        vertex_normals=surface.normals.astype(np.float32),
+        triangle_indices=surface.faces.astype(np.uint32),
+        face_rendering=rr.components.MeshFaceRendering.Front,  # as MuJoCo draws them
+        albedo_factor=np.rint(255 * rgba).astype(np.uint8),
+    )
+
+
+def _log_pose(stream: rr.RecordingStream, path: str, t_s: Array, poses: Poses, body: int) -> None:
+    """A body's pose: once if it never moves, else at every sample. rerun's quaternions are xyzw."""
+    position, quaternion = poses.position[:, body], poses.quaternion[:, body][:, [1, 2, 3, 0]]
+    if np.all(position == position[0]) and np.all(quaternion == quaternion[0]):
+        pose = rr.Transform3D(translation=position[0], quaternion=rr.Quaternion(xyzw=quaternion[0]))
+        stream.log(path, pose, static=True)
+        return
+    columns = rr.Transform3D.columns(
+        translation=position.astype(np.float32), quaternion=quaternion.astype(np.float32)
+    )
+    stream.send_columns(path, [rr.TimeColumn(TIMELINE, duration=timestamps(t_s))], columns)
+
+
+def _log_paths(stream: rr.RecordingStream, trace: Trace) -> None:
+    rows = np.unique(np.linspace(0, len(trace) - 1, _POINTS_PER_LINE).astype(np.intp))
+    for name, block, color, width in (
+        ("desired_path", "tip_ref", palette.SKY, 1.8),
+        ("actual_path", "tip", palette.VERMILION, 0.8),
+    ):
+        line = trace.block(block)[rows]
+        line = line[np.isfinite(line).all(axis=1)].astype(np.float32)
+        strip = rr.LineStrips3D([line], radii=rr.Radius.ui_points(width), colors=[color])
+        stream.log(f"{SCENE}/{name}", strip, static=True)
+
+
+def _log_points(
+    stream: rr.RecordingStream, trace: Trace, rows: np.ndarray[tuple[int], np.dtype[np.intp]]
+) -> None:
+    """The tip, and the RCM error as an arrow from the trocar to the shaft, enlarged."""
+    times = [rr.TimeColumn(TIMELINE, duration=timestamps(trace["t_s"][rows]))]
+    tip, trocar = trace.block("tip")[rows], trace.block("trocar")[rows]
+    point, arrow = f"{SCENE}/tip", f"{SCENE}/rcm_error_x{RCM_ARROW_SCALE:g}"
+    stream.log(
+        point,
+        rr.Points3D.from_fields(colors=[palette.VERMILION], radii=rr.Radius.ui_points(2.5)),
+        static=True,
+    )
+    stream.send_columns(point, times, rr.Points3D.columns(positions=tip.astype(np.float32)))
+    if not np.isfinite(trocar).all():
+        return
+    style = rr.Arrows3D.from_fields(
+        colors=[palette.YELLOW],
+        radii=rr.Radius.ui_points(2.5),
+        labels=[f"RCM error x{RCM_ARROW_SCALE:g}"],
+        show_labels=False,  # it would cover the port
+    )
+    stream.log(arrow, style, static=True)
+    vectors = RCM_ARROW_SCALE * rcm_errors(tip, trace.block("wrist")[rows], trocar)
+    columns = rr.Arrows3D.columns(origins=trocar.astype(np.float32), vectors=vectors.astype(np.float32))
+    stream.send_columns(arrow, times, columns)
+
+
+def rcm_errors(tip: Array, wrist: Array, trocar: Array) -> Array:
+    """Vectors (n, 3) [m] from the trocar to the nearest point of the shaft's axis.
+
+    p_CCp = (p - p_C) - d dᵀ(p - p_C), d the axis' direction, p any of its points.
+
+    Args:
+        tip: One point of the axis (n, 3) [m].
+        wrist: Another (n, 3) [m].
+        trocar: Remote centre of motion (n, 3) [m].
+    """
+    axis = tip - wrist
+    axis = axis / np.linalg.norm(axis, axis=1, keepdims=True)
+    offset = tip - trocar
+    nearest: Array = offset - np.sum(offset * axis, axis=1, keepdims=True) * axis
+    return nearest

@@ -1,0 +1,86 @@
+"""The signals of a recording: every column of the trace, the errors in millimetres, and the limits."""
+
+from collections.abc import Sequence
+
+import numpy as np
+import rerun as rr
+
+from surgsim.recording import palette
+from surgsim.recording.layout import ERRORS, LIMITS, TIMELINE, series_path, timestamps
+from surgsim.trace.trace import Array, Block, Trace
+
+_SCALAR_COLORS = {
+    "manipulability_6d": palette.ORANGE,
+    "rcm_error": palette.ORANGE,
+    "saturated_joints": palette.VERMILION,
+}
+
+
+def log_signals(stream: rr.RecordingStream, trace: Trace) -> None:
+    """Send every block at every control tick, then what is derived for the plots."""
+    times = [rr.TimeColumn(TIMELINE, duration=timestamps(trace["t_s"]))]
+    for block in trace.blocks:
+        values = trace.block(block.name)
+        _send(stream, series_path(block.name), times, values, names=_names(block), colors=_colors(block))
+    errors = 1e3 * np.stack([trace["tip_error_m"], trace["rcm_error_m"]], axis=1)
+    _send(stream, ERRORS, times, errors, names=["tip", "RCM"], colors=[palette.SKY, palette.ORANGE])
+    _log_limits(stream, trace)
+
+
+def _send(
+    stream: rr.RecordingStream,
+    path: str,
+    times: list[rr.TimeColumn],
+    values: Array,
+    *,
+    names: Sequence[str],
+    colors: Sequence[tuple[int, int, int]],
+    width: float = 1.5,
+) -> None:
+    """One entity with a series for every column of `values` (rows, series)."""
+    widths = [width] * len(names)
+    stream.log(path, rr.SeriesLines(names=list(names), colors=list(colors), widths=widths), static=True)
+    columns = rr.Scalars.columns(scalars=np.ascontiguousarray(values).ravel())
+    stream.send_columns(path, times, columns.partition([values.shape[1]] * len(values)))
+
+
+def _names(block: Block) -> list[str]:
+    """The columns' names without the unit, e.g. `q1`."""
+    return [column.removesuffix(f"_{block.unit}") for column in block.columns]
+
+
+def _colors(block: Block) -> list[tuple[int, int, int]]:
+    if len(block.labels) == 1:
+        return [_SCALAR_COLORS.get(block.name, palette.SKY)]
+    return list(palette.SEVEN[: len(block.labels)])
+
+
+def _log_limits(stream: rr.RecordingStream, trace: Trace) -> None:
+    """A grey line from start to end for every distinct limit, named after its joints."""
+    limits = {name: np.array(values) for name, values in trace.meta.limits.items()}
+    ends = timestamps(trace["t_s"][[0, -1]] if len(trace) > 1 else trace["t_s"])
+    times = [rr.TimeColumn(TIMELINE, duration=ends)]
+    for name, lines in (
+        ("q", _distinct("max", limits["q_max"]) + _distinct("min", limits["q_min"])),
+        ("v", _distinct("max", limits["velocity"]) + _distinct("min", -limits["velocity"])),
+        ("tau", _distinct("max", limits["torque"]) + _distinct("min", -limits["torque"])),
+        ("control_time", [("control period", trace.meta.control_period_s)]),
+    ):
+        values = np.tile([value for _, value in lines], (len(ends), 1))
+        _send(
+            stream,
+            f"{LIMITS}/{name}",
+            times,
+            values,
+            names=[label for label, _ in lines],
+            colors=[palette.GREY] * len(lines),
+            width=1.0,
+        )
+
+
+def _distinct(word: str, values: Array) -> list[tuple[str, float]]:
+    """Name and value of every distinct limit, e.g. `max 1 3 5 7`."""
+    return [
+        (f"{word} {' '.join(str(i + 1) for i in np.flatnonzero(values == value))}", float(value))
+        for value in dict.fromkeys(values.tolist())
+    ]

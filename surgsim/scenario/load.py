@@ -1,0 +1,96 @@
+"""Finding and loading scenario and controller files."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from surgsim.control.controller import ControllerConfig
+from surgsim.errors import ScenarioError, unknown_name
+from surgsim.resources import resource_dir
+from surgsim.scenario.schema import Scenario
+from surgsim.scenario.validate import validate
+from surgsim.scenario.yaml_text import YamlDocument, read_yaml, set_value
+
+
+def shipped(folder: str = "") -> dict[str, Path]:
+    """Names and files of the shipped scenarios, or of `controllers` and the like."""
+    return {path.stem: path for path in sorted((resource_dir("scenarios") / folder).glob("*.yaml"))}
+
+
+def find(name: str, folder: str, kind: str) -> Path:
+    """The file that `name` means: a path, or the name of a shipped file.
+
+    Raises:
+        ScenarioError: If it is neither.
+    """
+    if name in shipped(folder):
+        return shipped(folder)[name]
+    path = Path(name)
+    if path.suffix in (".yaml", ".yml") or len(path.parts) > 1:
+        return path
+    raise ScenarioError("", f"{unknown_name(name, f'shipped {kind}', shipped(folder))} Or give a .yaml file.")
+
+
+def load_scenario(
+    name: str,
+    *,
+    controller: str | None = None,
+    assignments: Sequence[str] = (),
+    seed: int | None = None,
+) -> Scenario:
+    """Load a scenario by path or shipped name.
+
+    Args:
+        name: Path of a YAML file, or the name of a shipped scenario.
+        controller: Controller to use instead of the scenario's own: a path or a shipped name.
+        assignments: `key.path=value` overrides, applied after the controller is put in place.
+        seed: Seed to use instead of the scenario's own.
+
+    Raises:
+        ScenarioError: If anything is wrong, naming file, line and key.
+    """
+    document = read_yaml(find(name, "", "scenario"))
+    if controller is not None:
+        document = replace(document, tree={**document.tree, "controller": controller})
+    document = _with_controller(document, from_option=controller is not None)
+    for assignment in assignments:
+        document = _with_controller(set_value(document, assignment), from_option=True)
+    if seed is not None:
+        document = set_value(document, f"seed={seed}")
+    return validate(Scenario, document)
+
+
+def load_controller(name: str) -> ControllerConfig:
+    """Load a controller by path or shipped name.
+
+    Raises:
+        ScenarioError: If anything is wrong, naming file, line and key.
+    """
+    return validate(ControllerConfig, read_yaml(find(name, "controllers", "controller")))
+
+
+def _with_controller(document: YamlDocument, *, from_option: bool) -> YamlDocument:
+    """`document` with a controller given by name replaced by that controller's content.
+
+    The controller's file is checked first, so that its errors name it.
+    """
+    name = document.tree.get("controller")
+    if not isinstance(name, str):
+        return document
+    if Path(name).suffix in (".yaml", ".yml") and not from_option and not Path(name).is_absolute():
+        name = str(Path(document.source).parent / name)
+    try:
+        path = find(name, "controllers", "controller")
+        tree = read_yaml(path).tree
+    except ScenarioError as error:
+        if error.where:
+            raise
+        where = "--controller" if from_option else document.where(("controller",))
+        raise ScenarioError(where, error.reason) from error
+    load_controller(str(path))
+    return replace(document, tree=_replaced(document.tree, tree))
+
+
+def _replaced(tree: Mapping[str, Any], controller: Mapping[str, Any]) -> dict[str, Any]:
+    return {**tree, "controller": dict(controller)}

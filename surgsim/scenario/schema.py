@@ -1,0 +1,147 @@
+"""The scenario: one experiment, every default explicit."""
+
+import hashlib
+import json
+import re
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import AfterValidator, Field, NonNegativeInt, PositiveFloat, model_validator
+
+from surgsim.catalog import PartConfig
+from surgsim.control.controller import ControllerConfig
+from surgsim.models.config import InstrumentConfig, RobotConfig, SceneConfig, TrocarConfig, Vec7
+from surgsim.plant import PLANTS
+from surgsim.plant.disturbances import DISTURBANCES
+from surgsim.plant.dynamic import DynamicPlantConfig
+from surgsim.tasks import TASKS
+
+AnyTask: Any = TASKS.union()
+AnyPlant: Any = PLANTS.union()
+AnyDisturbance: Any = DISTURBANCES.union()
+
+
+def _check_name(name: str) -> str:
+    if not re.fullmatch(r"[a-z0-9][a-z0-9_]{0,63}", name):
+        raise ValueError(f"'{name}' must be lower-case letters, digits and underscores, at most 64")
+    return name
+
+
+Name = Annotated[str, AfterValidator(_check_name)]
+
+
+class StartConfig(PartConfig):
+    """The start configuration: given, or solved so that the shaft passes through the trocar.
+
+    Attributes:
+        q_rad: Joint positions to start from as they are; null: solve them.
+        posture_rad: Posture near which the solution is sought; null: the robot's own.
+    """
+
+    q_rad: Vec7 | None = None
+    posture_rad: Vec7 | None = None
+
+
+class SimulationConfig(PartConfig):
+    """Time steps.
+
+    Attributes:
+        timestep_s: MuJoCo's integration step [s].
+        control_period_s: Time between control ticks [s], a whole multiple of the timestep.
+    """
+
+    timestep_s: Annotated[float, Field(gt=0.0, le=0.02)] = 0.001
+    control_period_s: Annotated[float, Field(gt=0.0, le=0.1)] = 0.001
+
+    @model_validator(mode="after")
+    def _whole_ratio(self) -> Self:
+        ratio = self.control_period_s / self.timestep_s
+        if round(ratio) < 1 or abs(ratio - round(ratio)) > 1e-9 * ratio:
+            raise ValueError(
+                f"control_period_s {self.control_period_s:g} must be a whole multiple of timestep_s "
+                f"{self.timestep_s:g}, not {ratio:g} times it"
+            )
+        return self
+
+
+class SafetyConfig(PartConfig):
+    """Limits past which a run is stopped, as an outcome; null switches one off.
+
+    Attributes:
+        rcm_error_max_m: Distance of the shaft from the trocar [m].
+        tip_error_max_m: Distance of the tip from its command [m].
+        stop_at_joint_limit: Whether leaving the joint range ends the run.
+        stop_at_velocity_limit: Whether exceeding a joint velocity limit ends the run.
+    """
+
+    rcm_error_max_m: PositiveFloat | None = 0.05
+    tip_error_max_m: PositiveFloat | None = None
+    stop_at_joint_limit: bool = True
+    stop_at_velocity_limit: bool = True
+
+
+class RecordingConfig(PartConfig):
+    """What the recording holds besides every control tick.
+
+    Attributes:
+        scene_rate_hz: How often the poses of the 3-D scene are stored [Hz].
+    """
+
+    scene_rate_hz: Annotated[float, Field(gt=0.0, le=1000.0)] = 50.0
+
+
+class Scenario(PartConfig):
+    """One experiment: scene, task, controller, plant, disturbances, limits, seed."""
+
+    schema_version: Literal[1] = 1
+    name: Name
+    description: str = ""
+    seed: NonNegativeInt = 0
+    robot: RobotConfig
+    instrument: InstrumentConfig | None = InstrumentConfig()
+    trocar: TrocarConfig | None = None
+    theatre: bool = True
+    start: StartConfig = StartConfig()
+    task: AnyTask
+    controller: ControllerConfig
+    plant: AnyPlant = DynamicPlantConfig()
+    disturbances: tuple[AnyDisturbance, ...] = ()
+    simulation: SimulationConfig = SimulationConfig()
+    safety: SafetyConfig = SafetyConfig()
+    recording: RecordingConfig = RecordingConfig()
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Self:
+        if self.trocar is not None and self.instrument is None:
+            raise ValueError("a trocar needs an instrument: set instrument, or trocar to null")
+        if self.trocar is not None and self.instrument is not None:
+            bore, shaft = self.trocar.bore_diameter_m, self.instrument.shaft_diameter_m
+            if shaft >= bore:
+                raise ValueError(f"instrument.shaft_diameter_m {shaft:g} must be below the bore, {bore:g}")
+        if self.task.start_m is None and self.start.q_rad is None:
+            raise ValueError("give task.start_m, or start.q_rad where the path then begins")
+        if self.plant.uses_torque and self.controller.torque_law is None:
+            raise ValueError(f"plant '{self.plant.type}' needs controller.torque_law")
+        if self.disturbances and not self.plant.uses_torque:
+            raise ValueError(f"disturbances do not act on the '{self.plant.type}' plant: leave them out")
+        return self
+
+    @property
+    def scene(self) -> SceneConfig:
+        """What is compiled into the MuJoCo model."""
+        return SceneConfig(
+            robot=self.robot,
+            instrument=self.instrument,
+            trocar=self.trocar,
+            theatre=self.theatre,
+            timestep_s=self.simulation.timestep_s,
+        )
+
+    def resolved(self) -> dict[str, Any]:
+        """Every key with its value, as plain data that loads to the same scenario."""
+        data: dict[str, Any] = json.loads(self.model_dump_json())
+        return data
+
+    def sha256(self) -> str:
+        """Hash of the resolved scenario."""
+        text = json.dumps(self.resolved(), sort_keys=True, separators=(",", ":"))
+        return hashlib.sha256(text.encode()).hexdigest()

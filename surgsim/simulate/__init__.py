@@ -1,0 +1,1 @@
+"""Running a scenario: setup, the control loop, safety, the trace."""

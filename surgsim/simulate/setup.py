@@ -1,0 +1,124 @@
+"""Everything that a scenario needs, built and checked before the first tick."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from surgsim.control.controller import Controller
+from surgsim.errors import SurgsimError, UnreachableError
+from surgsim.models.arm import ArmModel
+from surgsim.models.build import Scene, build
+from surgsim.scenario.schema import Scenario
+from surgsim.simulate.start import Reach, check_path, solve_start
+from surgsim.tasks.base import Task
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Setup:
+    """Built parts of a scenario.
+
+    Attributes:
+        scenario: The scenario.
+        scene: The plant's compiled model, disturbances included.
+        arm: The controller's nominal model.
+        task: Desired tip motion.
+        plant: The plant, before its first reset.
+        controller: The controller, before its first tick.
+        q_start: Start configuration (7,) [rad].
+    """
+
+    scenario: Scenario
+    scene: Scene
+    arm: ArmModel
+    task: Task
+    plant: Any
+    controller: Controller
+    q_start: Array
+
+
+def prepare(scenario: Scenario) -> Setup:
+    """Build a scenario's parts, solve the start and check that the path can be reached.
+
+    Raises:
+        UnreachableError: If start or path cannot be reached through the trocar.
+        SurgsimError: If the model does not compile.
+    """
+    disturbances = [config.build() for config in scenario.disturbances]
+    arm = ArmModel(scenario.scene)
+    task, q_start = start_of(scenario, arm)
+    try:
+        scene = build(scenario.scene, disturbances, drawn=False)
+    except ValueError as error:
+        raise SurgsimError(f"{scenario.name}: MuJoCo refuses the model: {error}") from error
+    period = scenario.simulation.control_period_s
+    plant = scenario.plant.build(scene, period, disturbances, np.random.SeedSequence(scenario.seed))
+    controller = Controller(
+        scenario.controller,
+        arm,
+        dt_s=period,
+        has_trocar=scenario.trocar is not None,
+        use_torque_law=scenario.plant.uses_torque,
+    )
+    return Setup(
+        scenario=scenario,
+        scene=scene,
+        arm=arm,
+        task=task,
+        plant=plant,
+        controller=controller,
+        q_start=q_start,
+    )
+
+
+def start_of(scenario: Scenario, arm: ArmModel) -> tuple[Task, Array]:
+    """The task with its path placed in the world, and the start configuration (7,) [rad]."""
+    p_WC = None if scenario.trocar is None else np.array(scenario.trocar.position_m)
+    reach = Reach(arm, p_WC)
+    given = scenario.start.q_rad
+    if scenario.task.start_m is not None:
+        p_start = np.array(scenario.task.start_m)
+    else:
+        p_start = arm.kinematics(np.array(given)).p_WT
+    task = scenario.task.build(p_start)
+    try:
+        if given is None:
+            q = solve_start(reach, arm, p_start, _posture(scenario, arm))
+        else:
+            q = _checked_start(reach, arm, np.array(given), p_start)
+        if scenario.trocar is not None:
+            check_path(reach, task, q, scenario.instrument, scenario.trocar)
+    except UnreachableError as error:
+        raise UnreachableError(f"{scenario.name}: {error}") from error
+    return task, q
+
+
+def _posture(scenario: Scenario, arm: ArmModel) -> Array:
+    if scenario.start.posture_rad is not None:
+        return np.array(scenario.start.posture_rad)
+    key = mujoco.mj_name2id(arm.scene.model, mujoco.mjtObj.mjOBJ_KEY, "home")
+    if key >= 0:
+        return np.array(arm.scene.model.key_qpos[key])
+    return 0.5 * (arm.limits.q_min + arm.limits.q_max)
+
+
+def _checked_start(reach: Reach, arm: ArmModel, q: Array, p_start: Array) -> Array:
+    """`q` as given, if it is inside the limits, on the path and through the trocar."""
+    outside = np.flatnonzero((q < arm.limits.q_min) | (q > arm.limits.q_max))
+    if outside.size:
+        i = int(outside[0])
+        raise UnreachableError(
+            f"start.q_rad: joint {i + 1} at {q[i]:.4f} rad is outside "
+            f"[{arm.limits.q_min[i]:.4f}, {arm.limits.q_max[i]:.4f}] rad"
+        )
+    tip, rcm = reach.miss(q, p_start)
+    if tip > 1e-3 or rcm > 1e-3:
+        raise UnreachableError(
+            f"start.q_rad leaves the tip {1e3 * tip:.1f} mm from the path's start and the shaft "
+            f"{1e3 * rcm:.1f} mm from the trocar; both must be within 1 mm"
+        )
+    return q

@@ -1,0 +1,218 @@
+"""Immutable record of a run, one row per control tick."""
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from surgsim.errors import Outcome
+
+Array = NDArray[np.float64]
+
+JOINTS = tuple(str(i + 1) for i in range(7))
+AXES = ("x", "y", "z")
+TIMING_COLUMNS = ("control_time_s",)
+"""Columns that measure the machine, not the experiment: they differ between two equal runs."""
+
+
+@dataclass(frozen=True)
+class Block:
+    """Columns that belong together, e.g. the seven joint positions.
+
+    Attributes:
+        name: Stem of the columns' names.
+        labels: What tells them apart: joints `1`..`7`, axes `x`, `y`, `z`, or one empty label.
+        unit: SI unit suffix, empty for a pure number.
+    """
+
+    name: str
+    labels: tuple[str, ...]
+    unit: str
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """Column names, e.g. `q1_rad`, `tip_x_m`, `manipulability`."""
+        joiner = "" if self.labels == JOINTS else "_"
+        stems = [f"{self.name}{joiner}{label}" if label else self.name for label in self.labels]
+        return tuple(f"{stem}_{self.unit}" if self.unit else stem for stem in stems)
+
+
+def joints(name: str, unit: str) -> Block:
+    """Block of seven joint columns."""
+    return Block(name, JOINTS, unit)
+
+
+def vector(name: str, unit: str) -> Block:
+    """Block of x, y and z."""
+    return Block(name, AXES, unit)
+
+
+def scalar(name: str, unit: str = "") -> Block:
+    """Block of one column."""
+    return Block(name, ("",), unit)
+
+
+BASE_BLOCKS = (
+    scalar("t", "s"),
+    joints("q", "rad"),
+    joints("v", "rad_per_s"),
+    joints("tau", "nm"),
+    joints("qdot_ref", "rad_per_s"),
+    joints("q_ref", "rad"),
+    vector("tip", "m"),
+    vector("tip_ref", "m"),
+    vector("wrist", "m"),
+    vector("trocar", "m"),
+    scalar("tip_error", "m"),
+    scalar("rcm_error", "m"),
+    scalar("manipulability"),
+    scalar("manipulability_6d"),
+    scalar("resolver_residual", "m_per_s"),
+    scalar("saturated_joints"),
+    scalar("control_time", "s"),
+)
+"""Columns that every trace has. `tau_<term>` blocks, one per term of the torque law, follow."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Ending:
+    """How and when a run ended.
+
+    Attributes:
+        outcome: The kind of end.
+        t_s: Time of the end [s].
+        detail: What was seen, e.g. which joint with which value; empty when completed.
+        data: Arrays that let a failure be examined, e.g. the infeasible QP.
+    """
+
+    outcome: Outcome
+    t_s: float
+    detail: str = ""
+    data: Mapping[str, Array] = field(default_factory=dict)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data."""
+        return {
+            "name": self.outcome.name.lower(),
+            "sentence": self.outcome.value,
+            "t_s": self.t_s,
+            "detail": self.detail,
+            "data": {name: np.asarray(value).tolist() for name, value in self.data.items()},
+        }
+
+    @staticmethod
+    def from_dict(plain: Mapping[str, Any]) -> "Ending":
+        """Inverse of `to_dict`."""
+        return Ending(
+            outcome=Outcome[plain["name"].upper()],
+            t_s=float(plain["t_s"]),
+            detail=str(plain["detail"]),
+            data={name: np.array(value, dtype=float) for name, value in plain["data"].items()},
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
+class TraceMeta:
+    """What metrics need to know besides the columns; plain data, stored with the trace.
+
+    Attributes:
+        scenario: The resolved scenario.
+        control_period_s: Time between rows [s].
+        limits: Joint limits: q_min, q_max, velocity, acceleration, torque, lists of seven, SI.
+        ending: How the run ended.
+    """
+
+    scenario: Mapping[str, Any]
+    control_period_s: float
+    limits: Mapping[str, Sequence[float]]
+    ending: Ending
+
+    def to_json(self) -> str:
+        """The meta data as JSON."""
+        return json.dumps(
+            {
+                "scenario": self.scenario,
+                "control_period_s": self.control_period_s,
+                "limits": {name: list(values) for name, values in self.limits.items()},
+                "ending": self.ending.to_dict(),
+            },
+            sort_keys=True,
+        )
+
+    @staticmethod
+    def from_json(text: str) -> "TraceMeta":
+        """Inverse of `to_json`.
+
+        Raises:
+            ValueError: If the text is not such JSON.
+        """
+        try:
+            data = json.loads(text)
+            return TraceMeta(
+                scenario=data["scenario"],
+                control_period_s=float(data["control_period_s"]),
+                limits={name: [float(x) for x in values] for name, values in data["limits"].items()},
+                ending=Ending.from_dict(data["ending"]),
+            )
+        except (KeyError, TypeError, AttributeError) as error:
+            raise ValueError(f"damaged trace meta data: {error!r}") from error
+
+
+class Trace:
+    """Columns of a run, read-only.
+
+    Args:
+        data: Rows x columns; copied unless already read-only.
+        blocks: The columns, in order.
+        meta: What belongs to them.
+    """
+
+    def __init__(self, data: Array, blocks: Sequence[Block], meta: TraceMeta) -> None:
+        columns = [name for block in blocks for name in block.columns]
+        if data.ndim != 2 or data.shape[1] != len(columns):
+            raise ValueError(f"{data.shape} data for {len(columns)} columns")
+        self._data = data.copy() if data.flags.writeable else data
+        self._data.flags.writeable = False
+        self._index = {name: i for i, name in enumerate(columns)}
+        self._blocks = {block.name: block for block in blocks}
+        self.meta = meta
+
+    def __len__(self) -> int:
+        return int(self._data.shape[0])
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """Names of all columns."""
+        return tuple(self._index)
+
+    @property
+    def blocks(self) -> tuple[Block, ...]:
+        """The blocks, in order."""
+        return tuple(self._blocks.values())
+
+    @property
+    def data(self) -> Array:
+        """All columns (rows, columns), read-only."""
+        return self._data
+
+    def __getitem__(self, column: str) -> Array:
+        """One column (rows,)."""
+        return self._data[:, self._index[column]]
+
+    def block(self, name: str) -> Array:
+        """A block's columns (rows, width)."""
+        first = self._index[self._blocks[name].columns[0]]
+        return self._data[:, first : first + len(self._blocks[name].columns)]
+
+    def equals(self, other: "Trace") -> bool:
+        """Whether both hold the same experiment bit for bit; machine timings are left out."""
+        if self.columns != other.columns or len(self) != len(other):
+            return False
+        return all(
+            np.array_equal(self[name], other[name], equal_nan=True)
+            for name in self.columns
+            if name not in TIMING_COLUMNS
+        )

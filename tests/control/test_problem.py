@@ -1,0 +1,68 @@
+"""Bounds Omega and the stacked rows of eq. (20)."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from surgsim.control.problem import bounded_resolution, stacked_rows, velocity_bounds
+
+
+def _at(arm, fraction):
+    return arm.limits.q_min + fraction * (arm.limits.q_max - arm.limits.q_min)
+
+
+def test_far_from_the_position_limits_the_velocity_limits_bound(arm):
+    lower, upper = velocity_bounds(_at(arm, 0.5), arm.limits, 10.0)
+    np.testing.assert_array_equal(lower, -arm.limits.velocity)
+    np.testing.assert_array_equal(upper, arm.limits.velocity)
+
+
+def test_near_a_position_limit_the_distance_times_alpha_bounds(arm):
+    lower, upper = velocity_bounds(arm.limits.q_max - 0.01, arm.limits, 10.0)
+    np.testing.assert_allclose(upper, 0.1)
+    np.testing.assert_array_equal(lower, -arm.limits.velocity)
+    lower, upper = velocity_bounds(arm.limits.q_min + 0.01, arm.limits, 10.0)
+    np.testing.assert_allclose(lower, -0.1)
+    np.testing.assert_array_equal(upper, arm.limits.velocity)
+
+
+@given(st.floats(-1.0, 2.0), st.floats(0.1, 1000.0))
+def test_bounds_are_never_empty_and_drive_a_joint_past_its_limit_back(arm, fraction, alpha):
+    lower, upper = velocity_bounds(_at(arm, fraction), arm.limits, alpha)
+    assert (lower <= upper).all()
+    assert (np.abs([lower, upper]) <= arm.limits.velocity).all()
+    if fraction > 1.0 + 1e-9:
+        assert (upper < 0.0).all()
+    if fraction < -1e-9:
+        assert (lower > 0.0).all()
+
+
+@given(st.floats(0.0, 1.0), st.integers(0, 100))
+def test_moving_inside_the_bounds_for_a_period_keeps_a_joint_in_its_range(arm, fraction, seed):
+    q = _at(arm, fraction)
+    lower, upper = velocity_bounds(q, arm.limits, 10.0)
+    moved = q + 0.1 * np.random.default_rng(seed).uniform(lower, upper)  # alpha T = 1
+    assert (moved >= arm.limits.q_min - 1e-12).all()
+    assert (moved <= arm.limits.q_max + 1e-12).all()
+
+
+def test_rows_follow_the_command_with_feedback(velocity_problem):
+    p = velocity_problem(3)
+    J, rhs = stacked_rows(p, 5.0, 7.0)
+    np.testing.assert_array_equal(J, np.vstack([p.kin.Jv_WT, p.rcm.jacobian]))
+    np.testing.assert_allclose(rhs[:3], p.command.v_WTd - 5.0 * (p.kin.p_WT - p.command.p_WTd))
+    np.testing.assert_allclose(rhs[3:], p.rcm.trocar_velocity - 7.0 * p.rcm.error)
+    J, rhs = stacked_rows(velocity_problem(3, trocar=False), 5.0, 7.0)
+    assert (J.shape, rhs.shape) == ((3, 7), (3,))
+
+
+@given(st.integers(0, 100), st.floats(0.0, 100.0))
+@settings(deadline=None)
+def test_a_bounded_answer_is_the_nearest_one_inside_with_its_residual(velocity_problem, seed, size):
+    p = velocity_problem(seed)
+    qdot = size * np.random.default_rng(seed).standard_normal(7)
+    J, rhs = stacked_rows(p, 5.0, 5.0)
+    answer = bounded_resolution(p, qdot, J, rhs)
+    np.testing.assert_array_equal(answer.qdot, np.clip(qdot, p.lower, p.upper))
+    assert answer.residual == pytest.approx(np.linalg.norm(J @ answer.qdot - rhs))
