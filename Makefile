@@ -76,5 +76,6 @@ $(INSTALLED_DEV): | $(PY)
 
 $(PY):
 	@test -n '$(PYTHON)' || { echo 'surgsim needs Python 3.11 or newer, and none was found. Set PYTHON=/path/to/python3.11' >&2; exit 1; }
+	@"$(PYTHON)" -c '' || { echo 'surgsim needs Python 3.11 or newer, and $(PYTHON) does not run. Set PYTHON=/path/to/python3.11' >&2; exit 1; }
 	@"$(PYTHON)" -c '$(OLD_ENOUGH)'
 	@"$(PYTHON)" -m venv '$(VENV)'

@@ -73,7 +73,8 @@ def velocity_problem(arm, random_q) -> Callable[..., VelocityProblem]:
         rng = np.random.default_rng(seed)
         q = random_q(rng) if q is None else q
         kin = arm.kinematics(q)
-        p_WC = _trocar_point(kin, rng, rcm_error_m) if trocar else np.zeros(3)
+        p_WC = _trocar_point(kin, rng, rcm_error_m) if trocar else np.full(3, np.nan)
+        v_WC = trocar_speed * rng.standard_normal(3) if trocar else np.full(3, np.nan)
         lower, upper = velocity_bounds(q, arm.limits, 10.0)
         return VelocityProblem(
             t_s=t_s,
@@ -86,11 +87,13 @@ def velocity_problem(arm, random_q) -> Callable[..., VelocityProblem]:
                 v_WTd=speed * rng.standard_normal(3),
                 a_WTd=0.1 * rng.standard_normal(3),
             ),
-            rcm=rcm_kinematics(kin, p_WC, trocar_speed * rng.standard_normal(3)) if trocar else None,
+            rcm=rcm_kinematics(kin, p_WC, v_WC) if trocar else None,
             p_WC=p_WC,
+            v_WC=v_WC,
             lower=lower,
             upper=upper,
             limits=arm.limits,
+            position_gain_per_s=10.0,
         )
 
     return make
@@ -103,7 +106,6 @@ def torque_problem(arm, velocity_problem) -> Callable[..., TorqueProblem]:
     def make(seed: int, *, trocar: bool = True) -> TorqueProblem:
         p = velocity_problem(seed, trocar=trocar)
         rng = np.random.default_rng(seed + 1000)
-        v_WC = 0.01 * rng.standard_normal(3) if trocar else np.zeros(3)
         return TorqueProblem(
             t_s=0.1,
             dt_s=p.dt_s,
@@ -112,9 +114,9 @@ def torque_problem(arm, velocity_problem) -> Callable[..., TorqueProblem]:
             tau_measured=rng.standard_normal(7),
             kin=p.kin,
             dyn=arm.dynamics(p.q, p.v),
-            rcm=rcm_kinematics(p.kin, p.p_WC, v_WC) if trocar else None,
+            rcm=p.rcm,
             p_WC=p.p_WC,
-            v_WC=v_WC,
+            v_WC=p.v_WC,
             command=p.command,
             resolution=Resolution(qdot=0.1 * rng.standard_normal(7), residual=0.0),
             q_ref=p.q + 0.01 * rng.standard_normal(7),
@@ -146,7 +148,8 @@ def trace_of() -> Callable[..., Trace]:
         blocks = {block.name: block.columns for block in BASE_BLOCKS}
         for name, values in given.items():
             places = [columns.index(column) for column in blocks.get(name, (name,))]
-            data[:, places] = np.reshape(values, (rows, -1))
+            values = np.asarray(values, dtype=float)
+            data[:, places] = values[:, None] if values.ndim == 1 else values
         names = ("q_min", "q_max", "velocity", "acceleration", "torque")
         limits = {name: [float(i)] * 7 for i, name in enumerate(names, start=1)}
         limits["q_min"] = [-2.0] * 7

@@ -51,9 +51,7 @@ def execute(options: argparse.Namespace) -> int:
     return 0 if not found and recorded.trace.meta.ending.outcome is Outcome.COMPLETED else 1
 
 
-def _print(
-    trace: "Trace", metrics: Mapping[str, float | None], found: list[str], as_json: bool
-) -> None:
+def _print(trace: "Trace", metrics: Mapping[str, float | None], found: list[str], as_json: bool) -> None:
     ending = trace.meta.ending
     scenario = trace.meta.scenario
     if as_json:

@@ -8,11 +8,12 @@ from numpy.typing import NDArray
 from pydantic import PositiveFloat
 
 from surgsim.catalog import PartConfig
-from surgsim.control.problem import Resolution, VelocityProblem, velocity_bounds
+from surgsim.control.problem import ControlFailure, Resolution, VelocityProblem, velocity_bounds
 from surgsim.control.rcm import Rcm, rcm_kinematics
 from surgsim.control.resolvers import RESOLVERS
 from surgsim.control.torque_laws import TORQUE_LAWS
 from surgsim.control.torque_laws.base import TorqueProblem
+from surgsim.errors import Outcome
 from surgsim.models.arm import ArmModel, Dynamics, Kinematics
 from surgsim.plant.state import State
 from surgsim.tasks.base import TipCommand
@@ -100,6 +101,7 @@ class Controller:
         """Forget everything: the next tick is the first."""
         self._started = False
         self._q_ref = np.zeros(7)
+        self._qdot_ref = np.zeros(7)
         self._resolver_memory: Any = None
         self._law_memory: Any = None
 
@@ -109,8 +111,16 @@ class Controller:
         Raises:
             ControlFailure: If the controller has no answer.
         """
+        try:
+            return self._tick(state, command)
+        except np.linalg.LinAlgError as error:
+            raise ControlFailure(
+                Outcome.INFEASIBLE, f"the task Jacobian has lost rank ({error})", {"q": state.q}
+            ) from error
+
+    def _tick(self, state: State, command: TipCommand) -> ControlOutput:
         if not self._started:
-            self._q_ref = state.q.copy()
+            self._q_ref, self._qdot_ref = state.q.copy(), state.v.copy()
         measured = self._evaluate(state)
         velocity = self._velocity_problem(state, command, measured)
         if not self._started:
@@ -135,9 +145,9 @@ class Controller:
         return _Measured(kin=kin, dyn=dyn, rcm=self._rcm(kin, state))
 
     def _velocity_problem(self, state: State, command: TipCommand, measured: "_Measured") -> VelocityProblem:
-        q, kin, rcm = state.q, measured.kin, measured.rcm
+        q, v, kin, rcm = state.q, state.v, measured.kin, measured.rcm
         if self._config.evaluate_at == "reference":
-            q = self._q_ref
+            q, v = self._q_ref, self._qdot_ref
             kin = self._arm.kinematics(q)
             rcm = self._rcm(kin, state)
         lower, upper = velocity_bounds(q, self._arm.limits, self._config.position_gain_per_s)
@@ -145,14 +155,16 @@ class Controller:
             t_s=state.t_s,
             dt_s=self._dt,
             q=q,
-            v=state.v,
+            v=v,
             kin=kin,
             command=command,
             rcm=rcm,
             p_WC=state.p_WC,
+            v_WC=state.v_WC,
             lower=lower,
             upper=upper,
             limits=self._arm.limits,
+            position_gain_per_s=self._config.position_gain_per_s,
         )
 
     def _torque_problem(
@@ -179,6 +191,7 @@ class Controller:
         return rcm_kinematics(kin, state.p_WC, state.v_WC) if self._has_trocar else None
 
     def _advance_reference(self, resolution: Resolution) -> None:
+        self._qdot_ref = resolution.qdot
         step = self._dt * resolution.qdot
         limits = self._arm.limits
         self._q_ref = np.minimum(np.maximum(self._q_ref + step, limits.q_min), limits.q_max)

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surgsim.compiled import compiled
-from surgsim.models.arm import ArmModel
+from surgsim.models.arm import ArmModel, Kinematics
 
 Array = NDArray[np.float64]
 
@@ -72,15 +72,37 @@ def log_manipulability_gradient(J: Array, z: Array) -> Array:
     return gradient
 
 
+def velocity_product_accelerations(kin: Kinematics, v: Array) -> tuple[Array, Array]:
+    """Jv' v and Jw' v at joint velocities `v` (7,) [rad/s]: tip and angular acceleration, each (3,).
+
+    Jv' v = sum_ij dJ_j/dq_i v_i v_j, and Jw' v = sum_{i<j} z_i x z_j v_i v_j for revolute joints.
+    """
+    return _velocity_products(kin.Jv_WT, kin.z_W, v)
+
+
+@compiled
+def _velocity_products(J: Array, z: Array, v: Array) -> tuple[Array, Array]:
+    linear, angular = np.zeros(3), np.zeros(3)
+    H = jacobian_gradient(J, z)
+    for i in range(7):
+        for j in range(7):
+            for a in range(3):
+                linear[a] += H[i, a, j] * v[i] * v[j]
+        for j in range(i + 1, 7):
+            w = v[i] * v[j]
+            angular[0] += w * (z[i, 1] * z[j, 2] - z[i, 2] * z[j, 1])
+            angular[1] += w * (z[i, 2] * z[j, 0] - z[i, 0] * z[j, 2])
+            angular[2] += w * (z[i, 0] * z[j, 1] - z[i, 1] * z[j, 0])
+    return linear, angular
+
+
 def manipulability_series(arm: ArmModel, q: Array) -> tuple[Array, Array]:
     """Manipulability along joint positions `q` (n, 7): of the 3x7 and the 6x7 tip Jacobian, each (n,)."""
-    J = np.empty((len(q), 6, 7))
-    for i, row in enumerate(q):
-        if np.isfinite(row).all():
-            kin = arm.kinematics(row)
-            J[i, :3], J[i, 3:] = kin.Jv_WT, kin.Jw_WT
-        else:
-            J[i] = np.nan
-    translational = np.linalg.det(J[:, :3] @ J[:, :3].transpose(0, 2, 1))
-    whole = np.linalg.det(J @ J.transpose(0, 2, 1))
-    return np.sqrt(np.maximum(translational, 0.0)), np.sqrt(np.maximum(whole, 0.0))
+    finite = np.isfinite(q).all(axis=1)
+    J = np.zeros((len(q), 6, 7))
+    for i in np.flatnonzero(finite):
+        kin = arm.kinematics(q[i])
+        J[i, :3], J[i, 3:] = kin.Jv_WT, kin.Jw_WT
+    squares = np.linalg.det(J[:, :3] @ J[:, :3].transpose(0, 2, 1)), np.linalg.det(J @ J.transpose(0, 2, 1))
+    translational, whole = (np.where(finite, np.sqrt(np.maximum(s, 0.0)), np.nan) for s in squares)
+    return translational, whole

@@ -4,8 +4,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surgsim.compiled import compiled
-from surgsim.control.problem import ControlFailure
-from surgsim.errors import Outcome
 
 Array = NDArray[np.float64]
 
@@ -14,12 +12,9 @@ def least_velocity(J: Array, v: Array, qdot_0: Array | None = None) -> Array:
     """Q' = pinv(J) v + (I - pinv(J) J) q'_0: the solution of J q' = v nearest to `qdot_0` (7,) [rad/s].
 
     Raises:
-        ControlFailure: If J has lost rank.
+        numpy.linalg.LinAlgError: If J has lost rank.
     """
-    try:
-        return _nearest(J, v, _ZERO if qdot_0 is None else qdot_0)
-    except np.linalg.LinAlgError as error:
-        raise ControlFailure(Outcome.INFEASIBLE, "the task Jacobian has lost rank") from error
+    return _nearest(J, v, _ZERO if qdot_0 is None else qdot_0)
 
 
 _ZERO = np.zeros(7)

@@ -44,10 +44,12 @@ class VelocityProblem:
         kin: Kinematics at `q`.
         command: Desired tip motion.
         rcm: RCM error and Jacobian, or None without a trocar.
-        p_WC: Trocar position (3,) [m], zeros without one.
+        p_WC: Trocar position (3,) [m]; NaN without one.
+        v_WC: Trocar velocity (3,) [m/s]; zeros without one.
         lower: Lower velocity bounds Omega (7,) [rad/s].
         upper: Upper velocity bounds Omega (7,) [rad/s].
         limits: The arm's joint limits.
+        position_gain_per_s: alpha of Omega [1/s].
     """
 
     t_s: float
@@ -58,9 +60,11 @@ class VelocityProblem:
     command: TipCommand
     rcm: Rcm | None
     p_WC: Array
+    v_WC: Array
     lower: Array
     upper: Array
     limits: JointLimits
+    position_gain_per_s: float
 
     @property
     def tip_error(self) -> Array:
@@ -101,6 +105,71 @@ def _velocity_bounds(
     lower = np.maximum(-velocity, gain * (q_min - q))
     upper = np.minimum(velocity, gain * (q_max - q))
     return np.minimum(lower, velocity), np.maximum(upper, -velocity)
+
+
+BRAKING_SHARE = 0.5
+
+
+def braking_bounds(problem: VelocityProblem, last: Array) -> tuple[Array, Array]:
+    """Omega with acceleration limits: reachable from `last` (7,) [rad/s], and able to stop in time.
+
+    |q' - last| <= a_max T, and the speed towards a position limit is one from which half of a_max
+    can stop in time: the task rows couple the joints, so that another joint may have to brake harder.
+    Where these exclude each other, Omega and the room to stop hold before the acceleration limit.
+
+    Returns:
+        Lower and upper bounds, each (7,) [rad/s].
+    """
+    limits = problem.limits
+    return _braking_bounds(
+        problem.lower,
+        problem.upper,
+        problem.q,
+        last,
+        limits.q_min,
+        limits.q_max,
+        limits.acceleration,
+        BRAKING_SHARE * limits.acceleration,
+        problem.position_gain_per_s,
+        problem.dt_s,
+    )
+
+
+@compiled
+def _stopping_speed(room: float, a: float, gain: float, dt: float) -> float:
+    """Speed from which `a` suffices to stay below gain * room, Omega's bound, until standstill.
+
+    The parabola of constant deceleration meets the line gain * room with equal slope at the speed a / gain.
+    One period's travel is taken off the room first.
+    """
+    if room <= a / gain**2:
+        return gain * max(room, 0.0)
+    reach = a * dt
+    return float(np.sqrt(reach * reach + 2.0 * a * (room - 0.5 * a / gain**2)) - reach)
+
+
+@compiled
+def _braking_bounds(
+    lower: Array,
+    upper: Array,
+    q: Array,
+    last: Array,
+    q_min: Array,
+    q_max: Array,
+    a: Array,
+    a_stop: Array,
+    gain: float,
+    dt: float,
+) -> tuple[Array, Array]:
+    low, high = np.empty(7), np.empty(7)
+    for i in range(7):
+        reach = a[i] * dt
+        high[i] = min(upper[i], max(_stopping_speed(q_max[i] - q[i], a_stop[i], gain, dt), lower[i]))
+        low[i] = max(lower[i], min(-_stopping_speed(q[i] - q_min[i], a_stop[i], gain, dt), upper[i]))
+        fastest, slowest = last[i] + reach, last[i] - reach
+        high[i] = min(high[i], fastest) if fastest >= low[i] else low[i]
+        low[i] = max(low[i], slowest) if slowest <= high[i] else high[i]
+    return low, high
 
 
 def stacked_rows(

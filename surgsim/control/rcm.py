@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surgsim.compiled import compiled
-from surgsim.models.arm import Dynamics, Kinematics
+from surgsim.models.arm import Kinematics
 from surgsim.spatial import cross, skew
 
 Array = NDArray[np.float64]
@@ -65,18 +65,42 @@ def _rcm(
     return N @ r, J, N @ v_WC, N, depth
 
 
-def rcm_bias_acceleration(kin: Kinematics, dyn: Dynamics, v: Array, p_WC: Array, v_WC: Array) -> Array:
-    """N d2e/dt2 at zero joint and trocar acceleration, (2,) [m/s^2]: J_rcm' q' of second-order laws."""
-    R = kin.R_WT
-    N, d = R[:, :2].T, R[:, 2]
-    r = kin.p_WT - p_WC
-    r_dot = kin.Jv_WT @ v - v_WC
-    omega = kin.Jw_WT @ v
-    d_dot = cross(omega, d)
-    d_ddot = cross(dyn.Jw_dot_v, d) + cross(omega, d_dot)
-    depth_rate = float(d_dot @ r + d @ r_dot)
-    bias: Array = N @ (dyn.Jv_dot_v - float(d @ r) * d_ddot - 2.0 * depth_rate * d_dot)
-    return bias
+def rcm_bias_acceleration(
+    kin: Kinematics, v: Array, p_WC: Array, v_WC: Array, linear: Array, angular: Array
+) -> Array:
+    """N d2e/dt2 at zero joint and trocar acceleration, (2,) [m/s^2]: J_rcm' q' of second-order laws.
+
+    Args:
+        kin: Kinematics.
+        v: Joint velocities (7,) [rad/s].
+        p_WC: Trocar position (3,) [m].
+        v_WC: Trocar velocity (3,) [m/s].
+        linear: Jv' v (3,) [m/s^2].
+        angular: Jw' v (3,) [rad/s^2].
+    """
+    return _bias(kin.p_WT, kin.R_WT, kin.Jv_WT, kin.Jw_WT, v, p_WC, v_WC, linear, angular)
+
+
+@compiled
+def _bias(
+    p: Array,
+    R: Array,
+    Jv: Array,
+    Jw: Array,
+    v: Array,
+    p_WC: Array,
+    v_WC: Array,
+    linear: Array,
+    angular: Array,
+) -> Array:
+    d = np.ascontiguousarray(R[:, 2])
+    r = p - p_WC
+    r_dot = Jv @ v - v_WC
+    omega = Jw @ v
+    d_dot = np.cross(omega, d)
+    d_ddot = np.cross(angular, d) + np.cross(omega, d_dot)
+    depth_rate = d_dot @ r + d @ r_dot
+    return np.ascontiguousarray(R[:, :2].T) @ (linear - (d @ r) * d_ddot - 2.0 * depth_rate * d_dot)
 
 
 def rcm_cross_form(kin: Kinematics, p_WC: Array) -> tuple[Array, Array]:

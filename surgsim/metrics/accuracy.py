@@ -17,9 +17,9 @@ def rms(values: NDArray[np.float64]) -> float:
 
 def convergence_time_s(trace: Trace) -> float:
     """Time from which the tip stays within 1 mm and the shaft within 5 mm [s]; NaN if never."""
-    late = trace["tip_error_m"] > CONVERGED_TIP_M
+    late = ~(trace["tip_error_m"] <= CONVERGED_TIP_M)
     if np.isfinite(trace["rcm_error_m"]).any():
-        late = late | (trace["rcm_error_m"] > CONVERGED_RCM_M)
+        late = late | ~(trace["rcm_error_m"] <= CONVERGED_RCM_M)
     outside = np.flatnonzero(late)
     if outside.size == 0:
         return 0.0

@@ -2,13 +2,13 @@
 
 import math
 
-from surgsim.metrics import accuracy, dexterity, effort, smoothness, timing
+from surgsim.metrics import accuracy, dexterity, effort, optimality, smoothness, timing
 from surgsim.metrics.metric import Metric
 from surgsim.trace.trace import Trace
 
 METRICS: dict[str, Metric] = {
     metric.name: metric
-    for group in (accuracy, dexterity, effort, smoothness, timing)
+    for group in (accuracy, dexterity, optimality, effort, smoothness, timing)
     for metric in group.METRICS
 }
 

@@ -26,6 +26,7 @@ class Kinematics:
         Jv_WT: Translational tip Jacobian (3, 7) [m/rad].
         Jw_WT: Rotational tip Jacobian (3, 7) [-].
         z_W: Joint axes as rows (7, 3), unit.
+        anchors_W: Points on the joint axes as rows (7, 3) [m].
     """
 
     p_WT: Array
@@ -33,6 +34,7 @@ class Kinematics:
     Jv_WT: Array
     Jw_WT: Array
     z_W: Array
+    anchors_W: Array
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -112,6 +114,7 @@ class ArmModel:
             Jv_WT=self._jacp.copy(),
             Jw_WT=self._jacr.copy(),
             z_W=data.xaxis.copy(),
+            anchors_W=data.xanchor.copy(),
         )
 
     def _read_dynamics(self, v: Array) -> Dynamics:

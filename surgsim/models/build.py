@@ -98,6 +98,7 @@ def build_arm(config: SceneConfig) -> Scene:
 def _add_arm(spec: mujoco.MjSpec, config: SceneConfig) -> None:
     spec.option.timestep = config.timestep_s
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET  # divergence must be seen
     spec.option.gravity = [0.0, 0.0, -GRAVITY_M_PER_S2]
     arm = robot_spec(config.robot.name)
     attach_instrument(arm, config.instrument)

@@ -3,7 +3,6 @@
 import mujoco
 import numpy as np
 
-from surgsim.errors import SurgsimError
 from surgsim.models.config import InstrumentConfig
 from surgsim.models.graft import asset, graft
 from surgsim.spatial import Array
@@ -38,17 +37,9 @@ def rod_masses(config: InstrumentConfig) -> tuple[float, float]:
     """Masses (adapter, shaft) [kg] of two uniform rods with the mass and centre of mass of `config`.
 
     m_a + m_s = m and m_a a/2 + m_s (a + s/2) = m c, with adapter length a, shaft length s, centre of mass c.
-
-    Raises:
-        SurgsimError: If `com_m` lies outside the two rods' centres, so that a mass would be negative.
     """
     a, s = config.adapter_length_m, config.shaft_length_m
     low, high = a / 2, a + s / 2
-    if not low <= config.com_m <= high:
-        raise SurgsimError(
-            f"instrument: com_m is {config.com_m:g}; an adapter of {a:g} m and a shaft of {s:g} m allow "
-            f"{low:g} (all mass in the adapter) to {high:g} (all in the shaft)"
-        )
     shaft = config.mass_kg * (config.com_m - low) / (high - low)
     return config.mass_kg - shaft, shaft
 

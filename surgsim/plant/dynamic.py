@@ -70,7 +70,9 @@ class DynamicPlant:
         self._data.qpos[self._scene.qpos_ids] = q
         self._tick = 0
         self._tau = np.zeros(7)
-        children = np.random.SeedSequence(self._seed.entropy).spawn(len(self._disturbances))
+        children = np.random.SeedSequence(self._seed.entropy, spawn_key=self._seed.spawn_key).spawn(
+            len(self._disturbances)
+        )
         for disturbance, child in zip(self._disturbances, children, strict=True):
             disturbance.start(self._scene, np.random.default_rng(child), self._dt)
         mujoco.mj_step1(self._scene.model, self._data)

@@ -18,7 +18,7 @@ class State:
         v: Joint velocities (7,) [rad/s].
         tau: Joint torques that the actuators gave over the last period (7,) [N m].
         p_WC: Trocar position, world frame (3,) [m]; NaN without a trocar.
-        v_WC: Trocar velocity (3,) [m/s]; NaN without a trocar.
+        v_WC: Trocar velocity (3,) [m/s]; zeros without a trocar.
     """
 
     t_s: float

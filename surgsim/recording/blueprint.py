@@ -9,7 +9,7 @@ from surgsim.scenario.schema import Scenario
 from surgsim.trace.trace import BASE_BLOCKS, Array, Trace
 
 # Eye from the focus [m]; x points from the robot's base to the trocar, y to its left.
-_EYE_M = np.array([-0.34, -0.84, 0.54])
+_EYE_M = np.array([-0.38, -0.93, 0.58])
 _BACKGROUND = (52, 60, 66)
 
 
@@ -57,7 +57,7 @@ def _scene_view(scenario: Scenario, trace: Trace) -> rrb.Spatial3DView:
         [ahead[0] * _EYE_M[0] - ahead[1] * _EYE_M[1], ahead[1] * _EYE_M[0] + ahead[0] * _EYE_M[1], 0.0]
     )
     eye[2] = _EYE_M[2]
-    target = focus + 0.25 * (base - focus) + np.array([0.0, 0.0, 0.12])
+    target = focus + 0.25 * (base - focus) + np.array([0.0, 0.0, 0.15])
     return rrb.Spatial3DView(
         name=f"Tip path: desired blue, actual red. RCM error x{RCM_ARROW_SCALE:g}: yellow arrow",
         origin=f"/{SCENE}",

@@ -3,6 +3,7 @@
 import os
 import stat
 import struct
+from importlib.metadata import version
 from pathlib import Path
 from typing import BinaryIO
 
@@ -10,6 +11,7 @@ from surgsim.errors import RecordingError
 from surgsim.recording.layout import FILE_NAME
 
 _MAGIC = b"RRF2"
+_ENCODINGS = (b"\x00\x02\x00\x00", b"\x01\x02\x00\x00")  # protobuf, uncompressed or LZ4
 _FOOTER_MAGIC = b"RRF2FOOT"
 _FILE_HEADER_BYTES = 12
 _FOOTER_BYTES = 32
@@ -37,7 +39,7 @@ def recording_file(path: Path) -> Path:
 def check_framing(file: Path) -> None:
     """Walk over the messages of a rerun file, from its header to its footer.
 
-    A file is `RRF2`, version, options; messages of kind and size (unsigned 64 bit, little endian) and body;
+    A file is `RRF2`, version, encoding; messages of kind and size (unsigned 64 bit, little endian) and body;
     last a message of kind 0 and a footer of 32 bytes around `RRF2FOOT`. A file cut short fails here, and so
     does a size that would make a reader allocate without bound.
 
@@ -54,12 +56,22 @@ def check_framing(file: Path) -> None:
         raise RecordingError(f"{file}: {reason}")
 
 
+def _installed_release() -> tuple[int, ...]:
+    """Major and minor version of the rerun in this environment."""
+    return tuple(int(part) for part in version("rerun-sdk").split(".")[:2])
+
+
 def _fault(stream: BinaryIO, size: int) -> str:
     """What is wrong with the file, or nothing."""
     if size == 0:
         return "is empty"
     if stream.read(len(_MAGIC)) != _MAGIC:
         return "is not a rerun recording"
+    release = tuple(stream.read(4)[:2])
+    if release > _installed_release():
+        return f"written by rerun {'.'.join(map(str, release))}, newer than the one installed"
+    if stream.read(4) not in _ENCODINGS:
+        return "damaged recording: its header is not rerun's"
     at = _FILE_HEADER_BYTES
     while at + _MESSAGE_HEADER.size <= size:
         stream.seek(at)

@@ -14,7 +14,7 @@ from surgsim.recording.shapes import Triangles, geom_triangles, joined
 from surgsim.scenario.schema import Scenario
 from surgsim.trace.trace import Array, Trace
 
-RCM_ARROW_SCALE = 10.0
+RCM_ARROW_SCALE = 20.0
 _DRAWN_GROUPS = 3  # MuJoCo shows geom groups 0 to 2 and keeps collision shapes in 3
 _POINTS_PER_LINE = 2000
 

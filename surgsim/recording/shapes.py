@@ -11,6 +11,7 @@ from surgsim.trace.trace import Array
 
 _AROUND = 40
 _INFINITE_PLANE_M = 5.0
+_CREASE_COSINE = np.cos(np.deg2rad(40.0))
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,15 +55,38 @@ def geom_triangles(model: mujoco.MjModel, geom: int) -> Triangles | None:
 
 
 def _mesh(model: mujoco.MjModel, mesh: int) -> Triangles:
-    """A mesh whose vertices are split where faces do not share a normal."""
+    """A mesh with normals smoothed over faces but not over edges; MuJoCo's own smooth sharp edges too."""
     first, count = model.mesh_faceadr[mesh], model.mesh_facenum[mesh]
-    vertex = model.mesh_face[first : first + count].astype(np.int64)
-    normal = model.mesh_facenormal[first : first + count].astype(np.int64)
-    width = int(model.mesh_normalnum[mesh])
-    corners, faces = np.unique(vertex * width + normal, return_inverse=True)
-    points = model.mesh_vert[model.mesh_vertadr[mesh] + corners // width]
-    normals = model.mesh_normal[model.mesh_normaladr[mesh] + corners % width]
-    return Triangles(points.astype(np.float64), normals.astype(np.float64), faces.reshape(-1, 3))
+    start, size = model.mesh_vertadr[mesh], model.mesh_vertnum[mesh]
+    points = model.mesh_vert[start : start + size].astype(np.float64)
+    faces = model.mesh_face[first : first + count].astype(np.int64)
+    normals = _corner_normals(points, faces)
+    quantised = np.rint(1000.0 * (normals + 1.0)).astype(np.int64)  # 11 bits each
+    keys = faces.ravel() << 33 | quantised[:, 0] << 22 | quantised[:, 1] << 11 | quantised[:, 2]
+    _, kept, shared = np.unique(keys, return_index=True, return_inverse=True)
+    return Triangles(points[faces.ravel()[kept]], normals[kept], shared.reshape(-1, 3))
+
+
+def _corner_normals(points: Array, faces: NDArray[np.int64]) -> Array:
+    """Normal of every face's every corner (3 m, 3).
+
+    It is the mean, weighted by area, over those faces at the corner's vertex that meet this face at less than
+    the crease angle.
+    """
+    a, b, c = (points[faces[:, i]] for i in range(3))
+    areas = np.cross(b - a, c - a)
+    normals = areas / np.maximum(np.linalg.norm(areas, axis=1, keepdims=True), 1e-300)
+    vertex = faces.ravel()
+    order, counts = np.argsort(vertex, kind="stable"), np.bincount(vertex)
+    others = counts[vertex]  # corners at the same vertex
+    mine = np.repeat(np.arange(len(vertex)), others)
+    nth = np.arange(len(mine)) - np.repeat(np.cumsum(others) - others, others)
+    theirs = order[np.repeat((np.cumsum(counts) - counts)[vertex], others) + nth]
+    close = np.einsum("ij,ij->i", normals[mine // 3], normals[theirs // 3]) > _CREASE_COSINE
+    mine, theirs = mine[close], theirs[close]
+    total = np.stack([np.bincount(mine, areas[theirs // 3, k], len(vertex)) for k in range(3)], axis=-1)
+    smooth: Array = total / np.maximum(np.linalg.norm(total, axis=1, keepdims=True), 1e-300)
+    return smooth
 
 
 def _grid(rows: int, columns: int) -> NDArray[np.int64]:

@@ -5,9 +5,10 @@ from pathlib import Path
 
 import rerun as rr
 
-from surgsim.errors import Outcome
+from surgsim.errors import Outcome, RecordingError
 from surgsim.recording.blueprint import blueprint
 from surgsim.recording.files import replacing
+from surgsim.recording.framing import check_framing
 from surgsim.recording.layout import APPLICATION, HEADER, LOG, SEAL, SUMMARY, TIMELINE, Header, seal
 from surgsim.recording.scene import log_scene, scenario_of
 from surgsim.recording.signals import log_signals
@@ -39,8 +40,17 @@ def write_recording(path: Path, trace: Trace, metrics: Mapping[str, float | None
         log_signals(stream, trace)
         log_scene(stream, scenario, trace)
         _log_texts(stream, trace.meta, metrics)
+        _finish(stream, temporary, path)
+
+
+def _finish(stream: rr.RecordingStream, temporary: Path, path: Path) -> None:
+    """Flush, and make sure that the file is whole: rerun does not always say that the disk is full."""
+    try:
         stream.flush()
         stream.disconnect()
+        check_framing(temporary)
+    except (RuntimeError, RecordingError) as error:
+        raise RecordingError(f"{path}: cannot be written whole; is the disk full? ({error})") from error
 
 
 def _log_texts(stream: rr.RecordingStream, meta: TraceMeta, metrics: Mapping[str, float | None]) -> None:

@@ -57,6 +57,8 @@ def load_scenario(
     for assignment in assignments:
         document = _with_controller(set_value(document, assignment), from_option=True)
     if seed is not None:
+        if seed < 0:
+            raise ScenarioError("--seed", f"{seed} is not allowed: must be 0 or more")
         document = set_value(document, f"seed={seed}")
     return validate(Scenario, document)
 

@@ -46,7 +46,7 @@ class Simulation:
         self._setup = setup
         scenario = setup.scenario
         self._period = scenario.simulation.control_period_s
-        self._ticks = round(setup.task.duration_s / self._period)
+        self._ticks = math.ceil(setup.task.duration_s / self._period - 1e-6)
         self._torque_limit = setup.scene.limits.torque
         self._safety = SafetyMonitor(scenario.safety, setup.scene.limits, scenario.trocar is not None)
         terms = tuple(joints(f"tau_{term}_", "nm") for term in setup.controller.terms)
@@ -98,11 +98,11 @@ class Simulation:
             return
         took = perf_counter() - began
         self._record(state, truth, command, output, took)
-        if self._count >= self._ticks:
-            self._ending = Ending(outcome=Outcome.COMPLETED, t_s=state.t_s)
-            return
         if not math.isfinite(output.torque @ output.torque):
             self._ending = Ending(outcome=Outcome.DIVERGED, t_s=state.t_s, detail="torque is not finite")
+            return
+        if self._count >= self._ticks:
+            self._ending = Ending(outcome=Outcome.COMPLETED, t_s=state.t_s)
             return
         self._state = setup.plant.step(output.torque, output.resolution.qdot)
         self._count += 1

@@ -12,7 +12,7 @@ from surgsim.errors import SurgsimError, UnreachableError
 from surgsim.models.arm import ArmModel
 from surgsim.models.build import Scene, build
 from surgsim.scenario.schema import Scenario
-from surgsim.simulate.start import Reach, check_path, solve_start
+from surgsim.simulate.start import Reach, check_path, check_through_port, solve_start
 from surgsim.tasks.base import Task
 
 Array = NDArray[np.float64]
@@ -86,6 +86,8 @@ def start_of(scenario: Scenario, arm: ArmModel) -> tuple[Task, Array]:
         p_start = arm.kinematics(np.array(given)).p_WT
     task = scenario.task.build(p_start)
     try:
+        if scenario.trocar is not None:
+            check_through_port(p_start, "the start at", scenario.instrument, scenario.trocar)
         if given is None:
             q = solve_start(reach, arm, p_start, _posture(scenario, arm))
         else:

@@ -130,18 +130,29 @@ def check_path(
     q = q_start
     for t in np.linspace(0.0, task.duration_s, _SAMPLES):
         p = task.command(float(t)).p_WTd
-        where = f"at t = {t:.2f} s the path point {_point(p)} cannot be reached"
-        if instrument is not None and trocar is not None:
-            reason = _outside_port(p, instrument, trocar)
-            if reason:
-                raise UnreachableError(f"{where}: {reason}")
+        where = f"at t = {t:.2f} s the path point"
+        if trocar is not None:
+            check_through_port(p, where, instrument, trocar)
         q = reach.solve(p, q, q, 10)
         tip, rcm = reach.miss(q, p)
         if tip > 1e-4 or rcm > 1e-4:
             raise UnreachableError(
-                f"{where}: the tip stays {1e3 * tip:.1f} mm and the shaft {1e3 * rcm:.1f} mm away "
-                f"({reach.near_limit(q)})"
+                f"{where} {_point(p)} cannot be reached: the tip stays {1e3 * tip:.1f} mm "
+                f"and the shaft {1e3 * rcm:.1f} mm away ({reach.near_limit(q)})"
             )
+
+
+def check_through_port(
+    p: Array, what: str, instrument: InstrumentConfig | None, trocar: TrocarConfig
+) -> None:
+    """Refuse a tip position `p` (3,) [m] that is no pose of the instrument through the port.
+
+    Raises:
+        UnreachableError: With `what` and the reason.
+    """
+    reason = None if instrument is None else _outside_port(p, instrument, trocar)
+    if reason:
+        raise UnreachableError(f"{what} {_point(p)} cannot be reached: {reason}")
 
 
 def _outside_port(p: Array, instrument: InstrumentConfig, trocar: TrocarConfig) -> str | None:

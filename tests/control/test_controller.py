@@ -23,7 +23,14 @@ def at(velocity_problem):
 
     def make(tick=0, seed=0, dt_s=DT, **changes):
         p = velocity_problem(seed)
-        state = {"q": p.q, "v": np.zeros(7), "tau": np.zeros(7), "p_WC": p.p_WC, "v_WC": np.zeros(3), **changes}
+        state = {
+            "q": p.q,
+            "v": np.zeros(7),
+            "tau": np.zeros(7),
+            "p_WC": p.p_WC,
+            "v_WC": np.zeros(3),
+            **changes,
+        }
         return State(t_s=tick * dt_s, **state), p.command
 
     return make
@@ -46,8 +53,7 @@ def test_reference_starts_at_the_first_state_and_integrates_the_resolver_s_veloc
 
 def test_reference_stays_inside_the_joint_limits(arm, config, at):
     controller = _controller(config, arm, dt_s=0.1)
-    state, command = at()
-    far = TipCommand(p_WTd=command.p_WTd + [0, 0, 1.0], v_WTd=np.zeros(3), a_WTd=np.zeros(3))
+    far = TipCommand(p_WTd=at()[1].p_WTd + np.array([0, 0, 1.0]), v_WTd=np.zeros(3), a_WTd=np.zeros(3))
     for tick in range(200):  # the measured state never moves, so the reference runs away
         output = controller.tick(at(tick, dt_s=0.1)[0], far)
         assert (output.q_ref >= arm.limits.q_min).all()
@@ -108,5 +114,5 @@ def test_without_a_trocar_only_the_tip_is_controlled(arm, config, at):
 
 
 def test_an_unknown_controller_is_refused():
-    with pytest.raises(SurgsimError, match="'vprn' is not a shipped controller.*Did you mean 'vprnn'"):
+    with pytest.raises(SurgsimError, match=r"'vprn' is not a shipped controller.*Did you mean 'vprnn'"):
         load_controller("vprn")

@@ -1,11 +1,13 @@
 """Bounds Omega and the stacked rows of eq. (20)."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from surgsim.control.problem import bounded_resolution, stacked_rows, velocity_bounds
+from surgsim.control.problem import bounded_resolution, braking_bounds, stacked_rows, velocity_bounds
 
 
 def _at(arm, fraction):
@@ -66,3 +68,27 @@ def test_a_bounded_answer_is_the_nearest_one_inside_with_its_residual(velocity_p
     answer = bounded_resolution(p, qdot, J, rhs)
     np.testing.assert_array_equal(answer.qdot, np.clip(qdot, p.lower, p.upper))
     assert answer.residual == pytest.approx(np.linalg.norm(J @ answer.qdot - rhs))
+
+
+@pytest.mark.parametrize("side", [1, -1])
+@pytest.mark.parametrize("gain", [2.0, 10.0, 100.0])
+def test_braking_bounds_let_every_joint_run_to_its_limit_and_stop_there(arm, velocity_problem, side, gain):
+    """Full speed ahead from the middle: acceleration, speed and position limits all hold until rest."""
+    limits, dt = arm.limits, 0.004
+    q, v = 0.5 * (limits.q_min + limits.q_max), np.zeros(7)
+    fastest = np.zeros(7)
+    for _ in range(2500):
+        lower, upper = velocity_bounds(q, limits, gain)
+        p = replace(velocity_problem(0), q=q, dt_s=dt, lower=lower, upper=upper, position_gain_per_s=gain)
+        low, high = braking_bounds(p, v)
+        assert (low <= high).all()
+        new = high if side > 0 else low
+        assert (np.abs(new - v) <= limits.acceleration * dt * (1 + 1e-9)).all()
+        assert (np.abs(new) <= limits.velocity * (1 + 1e-12)).all()
+        q, v = q + dt * new, new
+        fastest = np.maximum(fastest, np.abs(v))
+        assert (q >= limits.q_min).all()
+        assert (q <= limits.q_max).all()
+    end = limits.q_max if side > 0 else limits.q_min
+    np.testing.assert_allclose(q, end, atol=1e-3)
+    assert (fastest > 0.5 * limits.velocity).all()

@@ -75,7 +75,7 @@ def _in_plane(points, config):
 def test_circle_has_its_radius_and_closes(seed):
     config = _tilted("circle", seed, radius_m=0.03, turns=2.0)
     p = _in_plane(_points(config.build(START)), config)
-    np.testing.assert_allclose(np.linalg.norm(p + [0.03, 0, 0], axis=1), 0.03, atol=1e-12)
+    np.testing.assert_allclose(np.hypot(p[:, 0] + 0.03, p[:, 1]), 0.03, atol=1e-12)
     np.testing.assert_allclose(p[:, 2], 0.0, atol=1e-12)
     np.testing.assert_allclose(p[-1], 0.0, atol=1e-12)
     assert np.linalg.norm(np.diff(p, axis=0), axis=1).sum() == pytest.approx(2 * 2 * np.pi * 0.03, rel=1e-4)

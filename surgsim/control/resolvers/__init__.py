@@ -7,8 +7,11 @@ RESOLVERS = Catalog(
     "surgsim.resolvers",
     {
         "gradient": "surgsim.control.resolvers.gradient:GradientConfig",
+        "mink": "surgsim.control.resolvers.mink:MinkConfig",
         "pinv": "surgsim.control.resolvers.pinv:PinvConfig",
+        "qp": "surgsim.control.resolvers.qp:QpConfig",
         "rnn": "surgsim.control.resolvers.rnn:RnnConfig",
+        "self_motion": "surgsim.control.resolvers.self_motion:SelfMotionConfig",
         "vprnn": "surgsim.control.resolvers.vprnn:VprnnConfig",
     },
 )

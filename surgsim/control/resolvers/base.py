@@ -19,5 +19,6 @@ class Resolver(Protocol[Memory]):
 
         Raises:
             ControlFailure: If there is no answer, e.g. the problem is infeasible.
+            numpy.linalg.LinAlgError: If the task Jacobian has lost rank.
         """
         ...

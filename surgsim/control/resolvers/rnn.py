@@ -93,7 +93,10 @@ class Rnn:
         J, _ = self._rows(problem)
         A = problem.kin.Jv_WT @ problem.kin.Jv_WT.T
         return RnnMemory(
-            omega=np.zeros(7), phi=np.asarray(np.linalg.inv(A)).ravel(), lam=np.zeros(len(J)), sigma=np.zeros(9)
+            omega=np.zeros(7),
+            phi=np.asarray(np.linalg.inv(A)).ravel(),
+            lam=np.zeros(len(J)),
+            sigma=np.zeros(9),
         )
 
     def step(self, problem: VelocityProblem, memory: RnnMemory) -> tuple[Resolution, RnnMemory]:

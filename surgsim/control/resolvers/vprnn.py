@@ -16,8 +16,10 @@ from surgsim.control.rcm import rcm_cross_form
 from surgsim.errors import Outcome
 from surgsim.linalg import solve
 from surgsim.models.arm import ArmModel
+from surgsim.spatial import cross
 
 Array = NDArray[np.float64]
+_DIVERGED = 1e12
 
 
 class VprnnConfig(PartConfig):
@@ -118,15 +120,14 @@ class Vprnn:
     def step(self, problem: VelocityProblem, memory: VprnnMemory) -> tuple[Resolution, VprnnMemory]:
         """One control period of the network, and its joint velocities projected on Omega."""
         terms = self.terms(problem)
-        try:
-            if self._c.integration == "exact":
-                qdot, memory = self._step_exact(terms, problem, memory)
-            else:
-                qdot, memory = self._step_euler(terms, problem, memory)
-        except np.linalg.LinAlgError as error:
-            raise ControlFailure(Outcome.INFEASIBLE, f"VPRNN: W is singular ({error})") from error
-        if not np.isfinite(qdot).all():
-            raise ControlFailure(Outcome.DIVERGED, "VPRNN: the network's state is not finite")
+        if self._c.integration == "exact":
+            qdot, memory = self._step_exact(terms, problem, memory)
+        else:
+            qdot, memory = self._step_euler(terms, problem, memory)
+        if not np.abs(qdot).max() < _DIVERGED:
+            raise ControlFailure(
+                Outcome.DIVERGED, "VPRNN: a joint velocity of the network exceeds 1e12 rad/s"
+            )
         J = np.concatenate((terms.J, terms.J_rcm))
         return bounded_resolution(problem, qdot, J, np.concatenate([terms.v_d, terms.v_rcm])), memory
 
@@ -138,7 +139,7 @@ class Vprnn:
             J_rcm, v_rcm = np.zeros((0, 7)), np.zeros(0)
         elif self._c.rcm_rows == "cross":
             error, J_rcm = rcm_cross_form(kin, problem.p_WC)
-            v_rcm = -self._c.k2 * error
+            v_rcm = cross(kin.R_WT[:, 2], problem.v_WC) - self._c.k2 * error
         else:
             J_rcm = problem.rcm.jacobian
             v_rcm = problem.rcm.trocar_velocity - self._c.k2 * problem.rcm.error
@@ -206,18 +207,15 @@ class Vprnn:
         return solve(K, b)[:7]
 
     def _step_euler(self, t: Terms, p: VelocityProblem, memory: VprnnMemory) -> tuple[Array, VprnnMemory]:
-        """Z += T W^-1 (-W' z + l' - beta exp(t) phi(W z - l)), eq. (29), with backward differences."""
+        """Explicit Euler z += T W^-1 (-W' z + l' - beta exp(t) phi(W z - l)), eq. (29), with backward differences."""
         W, l = self.system(t)  # noqa: E741
         z = np.zeros(len(l)) if memory.z is None else memory.z
         W_old = W if memory.W is None else memory.W
         l_old = l if memory.l is None else memory.l
         gain = self._c.beta * math.exp(min(p.t_s, self._c.exponent_cap))
         delta = W @ z - l
-        phi = (
-            delta
-            if self._c.activation_bound is None
-            else np.clip(delta, -self._c.activation_bound, self._c.activation_bound)
-        )
+        bound = math.inf if self._c.activation_bound is None else self._c.activation_bound
+        phi = np.clip(delta, -bound, bound)
         z_dot = self._solve(W, (l - l_old - (W - W_old) @ z) / p.dt_s - gain * phi)
         z = z + p.dt_s * z_dot
         return z[:7].copy(), VprnnMemory(z=z, W=W, l=l)

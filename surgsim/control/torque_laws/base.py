@@ -67,5 +67,6 @@ class TorqueLaw(Protocol[Memory]):
 
         Raises:
             ControlFailure: If there is no answer.
+            numpy.linalg.LinAlgError: If the task Jacobian has lost rank.
         """
         ...

@@ -1,0 +1,58 @@
+"""A trace as a table for other tools: Parquet or CSV, one row per control tick."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from surgsim.errors import SurgsimError
+from surgsim.recording.files import replacing
+from surgsim.trace.trace import Trace
+
+_ROWS_PER_WRITE = 4096
+
+
+def export(trace: Trace, path: Path) -> None:
+    """Write the columns of `trace`, in SI units that their names end with.
+
+    Parquet carries each column's unit in its field's metadata and the run's meta data (JSON) in the schema's,
+    both as plain text. CSV has a line of names, then numbers that read back to the same bits; NaN is an
+    empty field.
+
+    Args:
+        trace: The run.
+        path: File to write, `.parquet` or `.csv`; replaced if it exists, and never left half written.
+
+    Raises:
+        SurgsimError: If the suffix is another one, or the file cannot be written.
+    """
+    writer = _WRITERS.get(path.suffix.lower())
+    if writer is None:
+        raise SurgsimError(
+            f"{path}: cannot export to '{path.suffix}'. Allowed: {', '.join(sorted(_WRITERS))}."
+        )
+    with replacing(path) as temporary:
+        writer(trace, temporary)
+
+
+def _write_parquet(trace: Trace, path: Path) -> None:
+    units = [block.unit for block in trace.blocks for _ in block.columns]
+    fields = [
+        pa.field(name, pa.float64(), metadata={"unit": unit or "1"})
+        for name, unit in zip(trace.columns, units, strict=True)
+    ]
+    schema = pa.schema(fields, metadata={"surgsim.trace_meta": trace.meta.to_json()})
+    table = pa.Table.from_arrays([pa.array(trace[name]) for name in trace.columns], schema=schema)
+    pq.write_table(table, path, compression="zstd")
+
+
+def _write_csv(trace: Trace, path: Path) -> None:
+    with path.open("w", encoding="ascii", newline="") as stream:
+        stream.write(",".join(trace.columns) + "\n")
+        for first in range(0, len(trace), _ROWS_PER_WRITE):
+            rows = trace.data[first : first + _ROWS_PER_WRITE].tolist()
+            stream.writelines(",".join("" if x != x else repr(x) for x in row) + "\n" for row in rows)
+
+
+_WRITERS: dict[str, Callable[[Trace, Path], None]] = {".parquet": _write_parquet, ".csv": _write_csv}

@@ -1,0 +1,20 @@
+import math
+
+from surgsim.recording.stored import differences
+
+
+def test_equal_metrics_have_no_differences() -> None:
+    metrics = {"a": 1.0, "b": None, "c": math.nan, "d": 0.0}
+    assert differences(metrics, {**metrics, "a": 1.0 + 1e-12}) == []
+
+
+def test_every_difference_is_said() -> None:
+    stored = {"changed": 1.0, "gone": 2.0, "none": None, "small": 1e-12}
+    recomputed = {"changed": 1.5, "new": 3.0, "none": 0.0, "small": 2e-12}
+    assert differences(stored, recomputed) == [
+        "changed: stored 1.0, the trace gives 1.5",
+        "gone: stored 2.0, not known to this surgsim",
+        "new: not stored, the trace gives 3.0",
+        "none: stored none, the trace gives 0.0",
+        "small: stored 1e-12, the trace gives 2e-12",
+    ]

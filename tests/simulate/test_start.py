@@ -1,0 +1,139 @@
+"""The start is solved through the trocar; what is out of reach is refused with the reason."""
+
+import re
+
+import numpy as np
+import pytest
+
+from surgsim.control.rcm import rcm_kinematics
+from surgsim.errors import UnreachableError
+from surgsim.models.config import InstrumentConfig, TrocarConfig
+from surgsim.scenario.load import load_scenario, shipped
+from surgsim.simulate.setup import prepare
+from surgsim.simulate.start import Reach, check_path, solve_start
+from surgsim.tasks.circle import CircleConfig
+
+GIVEN = "start.q_rad=[1.5708, 0.5236, 0.0, -1.5708, 0.0, 1.0472, 0.0]"
+
+
+def _assert_starts_well(setup):
+    s, arm = setup.scenario, setup.arm
+    kin = arm.kinematics(setup.q_start)
+    assert np.linalg.norm(kin.p_WT - np.array(s.task.start_m)) < 1e-6
+    assert np.linalg.norm(rcm_kinematics(kin, np.array(s.trocar.position_m), np.zeros(3)).error) < 1e-6
+    assert (setup.q_start > arm.limits.q_min).all()
+    assert (setup.q_start < arm.limits.q_max).all()
+
+
+@pytest.mark.parametrize("name", shipped())
+def test_every_shipped_scenario_starts_on_its_path_with_the_shaft_through_the_trocar(name):
+    _assert_starts_well(prepare(load_scenario(name, assignments=["theatre=false"])))
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_starts_all_over_the_workspace_are_solved(arm, seed):
+    rng = np.random.default_rng(seed)
+    p_WC = np.array([0.0, 0.55, 0.2])
+    p_WT = p_WC + rng.uniform([-0.06, -0.06, -0.2], [0.06, 0.06, -0.1])
+    posture = np.array([1.5708, 0.5236, 0.0, -1.5708, 0.0, 1.0472, 0.0])
+    reach = Reach(arm, p_WC)
+    tip, rcm = reach.miss(solve_start(reach, arm, p_WT, posture), p_WT)
+    assert max(tip, rcm) < 1e-6
+
+
+def test_without_a_trocar_the_tip_alone_is_placed(arm):
+    reach = Reach(arm, None)
+    q = solve_start(reach, arm, np.array([0.3, 0.4, 0.3]), np.full(7, 0.3))
+    np.testing.assert_allclose(arm.kinematics(q).p_WT, [0.3, 0.4, 0.3], atol=1e-6)
+
+
+def test_a_start_given_in_joints_is_taken_as_it_is_and_begins_the_path(scenario):
+    q = prepare(scenario()).q_start
+    setup = prepare(scenario(f"start.q_rad={q.tolist()}", "task.start_m=null"))
+    np.testing.assert_array_equal(setup.q_start, q)
+    np.testing.assert_allclose(setup.task.command(0.0).p_WTd, setup.arm.kinematics(q).p_WT, atol=1e-12)
+
+
+SPIRAL = "task={type: spiral, start_m: [0.02, 0.55, 0.02], length_m: 0.3, turns: 1.0, normal: [0, 0, -1]}"
+REFUSED = {
+    "too deep": (
+        ["task.start_m=[0.0, 0.55, -0.21]"],
+        "circle_lwr4plus: the start at (0.000, 0.550, -0.210) m cannot be reached: "
+        "it is 0.410 m from the trocar, but the shaft is 0.400 m long",
+    ),
+    "goes too deep": (
+        [SPIRAL],
+        r"/circle_lwr4plus: at t = \d\.\d\d s the path point \(.*\) m cannot be reached: "
+        r"it is 0\.4\d\d m from the trocar, but the shaft is 0\.400 m long",
+    ),
+    "too inclined": (
+        ["task.start_m=[0.2, 0.55, 0.19]", "task.radius_m=0.02"],
+        "circle_lwr4plus: the start at (0.200, 0.550, 0.190) m cannot be reached: "
+        "the shaft would be inclined 87 deg to the port's axis, more than 80 deg",
+    ),
+    "start out of joint range": (
+        ["trocar.position_m=[0.0, 1.2, 0.2]", "task.start_m=[0.02, 1.2, 0.02]"],
+        r"/circle_lwr4plus: the start at \(0\.020, 1\.200, 0\.020\) m cannot be reached: the best "
+        r"configuration found leaves the tip \d+\.\d mm and the shaft \d+\.\d mm away \(joint \d.* limit\)",
+    ),
+    "path out of joint range": (
+        ["task.radius_m=0.2"],
+        r"/circle_lwr4plus: at t = \d\.\d\d s the path point \(.*\) m cannot be reached: "
+        r"the tip stays \d+\.\d mm and the shaft \d+\.\d mm away \(joint \d.* at the position limit\)",
+    ),
+    "given start elsewhere": (
+        [GIVEN],
+        r"/circle_lwr4plus: start\.q_rad leaves the tip \d+\.\d mm from the path's start and the shaft "
+        r"\d+\.\d mm from the trocar; both must be within 1 mm",
+    ),
+    "given start out of range": (
+        [GIVEN.replace("[1.5708", "[3.5708")],
+        "circle_lwr4plus: start.q_rad: joint 1 at 3.5708 rad is outside [-2.9671, 2.9671] rad",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_out_of_reach_is_refused_with_the_reason(scenario, name):
+    changes, text = REFUSED[name]
+    pattern = text[1:] if text.startswith("/") else re.escape(text)
+    with pytest.raises(UnreachableError) as caught:
+        prepare(scenario(*changes))
+    assert re.fullmatch(pattern, str(caught.value)), str(caught.value)
+
+
+class Anywhere:
+    """An arm that reaches every point."""
+
+    def solve(self, p_WT, q, posture, iterations):
+        return q
+
+    def miss(self, q, p_WT):
+        return 0.0, 0.0
+
+
+@pytest.mark.parametrize(
+    ("tip", "reason"),
+    [
+        ([0.0, 0.3, 0.25], "it is outside the patient, 0.050 m above the port"),
+        ([0.0, 0.3, 0.2], "it is outside the patient, 0.000 m above the port"),
+        ([0.0, 0.2, 0.19], "the shaft would be inclined 84 deg to the port's axis, more than 80 deg"),
+        ([0.0, 0.3, -0.25], "it is 0.450 m from the trocar, but the shaft is 0.400 m long"),
+    ],
+)
+def test_points_that_are_no_pose_through_the_port_are_refused_whatever_the_arm(tip, reason):
+    task = CircleConfig(radius_m=1e-9).build(np.array(tip))
+    trocar = TrocarConfig(position_m=(0.0, 0.3, 0.2))
+    with pytest.raises(UnreachableError, match=re.escape(f"m cannot be reached: {reason}")):
+        check_path(Anywhere(), task, np.zeros(7), InstrumentConfig(), trocar)
+
+
+def test_a_path_below_the_port_is_accepted():
+    task = CircleConfig().build(np.array([0.0, 0.3, 0.0]))
+    trocar = TrocarConfig(position_m=(0.0, 0.3, 0.2))
+    check_path(Anywhere(), task, np.zeros(7), InstrumentConfig(), trocar)
+
+
+def test_a_start_above_the_port_is_refused_because_of_that(scenario):
+    with pytest.raises(UnreachableError, match=r"outside the patient, 0\.050 m above the port"):
+        prepare(scenario("task.start_m=[0.02, 0.55, 0.25]"))

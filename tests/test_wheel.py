@@ -1,0 +1,68 @@
+"""The wheel stands on its own: built, unpacked elsewhere and used from a folder that is no checkout."""
+
+import json
+import os
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+PIP = (sys.executable, "-m", "pip", "--quiet", "--no-input", "--disable-pip-version-check")
+
+
+def call(*command: object, cwd: Path, **variables: str) -> str:
+    """Standard output of a command that must succeed."""
+    done = subprocess.run(
+        [str(word) for word in command],
+        cwd=cwd,
+        env={**os.environ, **variables},
+        capture_output=True,
+        text=True,
+        timeout=120,
+    )
+    assert done.returncode == 0, f"{command}: exit {done.returncode}\n{done.stdout}\n{done.stderr}"
+    return done.stdout
+
+
+@pytest.fixture(scope="module")
+def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("wheel")
+    call(*PIP, "wheel", "--no-index", "--no-build-isolation", "--no-deps", "-w", folder, ROOT, cwd=folder)
+    (built,) = folder.glob("*.whl")
+    return built
+
+
+def test_it_holds_every_module_asset_and_scenario(wheel: Path) -> None:
+    with zipfile.ZipFile(wheel) as file:
+        packed = set(file.namelist())
+    modules = {path.relative_to(ROOT).as_posix() for path in (ROOT / "surgsim").rglob("*.py")}
+    data = {
+        f"surgsim/_data/{path.relative_to(ROOT).as_posix()}"
+        for folder, kinds in (("assets", ".xml"), ("scenarios", ".yaml"))
+        for path in (ROOT / folder).rglob(f"*{kinds}")
+    }
+    assert len(modules) > 50
+    assert len(data) > 5
+    assert (modules | data) - packed == set()
+    assert not [name for name in packed if name.startswith(("tests/", "docs/")) or "__pycache__" in name]
+
+
+def test_it_runs_a_shipped_scenario_by_name_from_anywhere(wheel: Path, tmp_path: Path) -> None:
+    target, elsewhere = tmp_path / "installed", tmp_path / "elsewhere"
+    elsewhere.mkdir()
+    call(*PIP, "install", "--no-index", "--no-deps", "--target", target, wheel, cwd=elsewhere)
+
+    def python(*words: str) -> str:
+        return call(sys.executable, "-W", "error", *words, cwd=elsewhere, PYTHONPATH=str(target))
+
+    place = python("-c", "import surgsim; print(surgsim.__file__)").strip()
+    assert Path(place).is_relative_to(target)
+    listed = json.loads(python("-m", "surgsim", "list", "scenarios", "--json"))
+    assert {item["name"] for item in listed} == {path.stem for path in (ROOT / "scenarios").glob("*.yaml")}
+    short = ("--set", "task.duration_s=2", "--set", "task.hold_end_s=0")
+    text = python("-m", "surgsim", "run", "circle_lwr4plus", "--no-record", "--json", "--out", "run", *short)
+    assert json.loads(text)["outcome"]["t_s"] == pytest.approx(2.5)
+    assert sorted(path.name for path in (elsewhere / "run").iterdir()) == ["metrics.json", "scenario.yaml"]
