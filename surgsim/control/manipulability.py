@@ -98,11 +98,8 @@ def _velocity_products(J: Array, z: Array, v: Array) -> tuple[Array, Array]:
 
 def manipulability_series(arm: ArmModel, q: Array) -> tuple[Array, Array]:
     """Manipulability along joint positions `q` (n, 7): of the 3x7 and the 6x7 tip Jacobian, each (n,)."""
-    finite = np.isfinite(q).all(axis=1)
-    J = np.zeros((len(q), 6, 7))
-    for i in np.flatnonzero(finite):
-        kin = arm.kinematics(q[i])
-        J[i, :3], J[i, 3:] = kin.Jv_WT, kin.Jw_WT
+    finite = np.asarray(np.isfinite(q).all(axis=1))
+    J = arm.jacobians(np.where(finite[:, None], q, 0.0))
     squares = np.linalg.det(J[:, :3] @ J[:, :3].transpose(0, 2, 1)), np.linalg.det(J @ J.transpose(0, 2, 1))
     translational, whole = (np.where(finite, np.sqrt(np.maximum(s, 0.0)), np.nan) for s in squares)
     return translational, whole

@@ -44,16 +44,10 @@ class Dynamics:
     Attributes:
         mass_matrix: Joint-space inertia with armature (7, 7) [kg m^2].
         bias: Coriolis, centrifugal and gravity torque (7,) [N m].
-        gravity: Gravity torque alone (7,) [N m].
-        Jv_dot_v: Tip acceleration at zero joint acceleration (3,) [m/s^2].
-        Jw_dot_v: Angular acceleration of the shaft at zero joint acceleration (3,) [rad/s^2].
     """
 
     mass_matrix: Array
     bias: Array
-    gravity: Array
-    Jv_dot_v: Array
-    Jw_dot_v: Array
 
 
 class ArmModel:
@@ -66,9 +60,9 @@ class ArmModel:
         self._scene: Scene = build_arm(config)
         self._model = self._scene.model
         self._data = mujoco.MjData(self._model)
-        self._jacp = np.zeros((3, 7))
-        self._jacr = np.zeros((3, 7))
-        self._full = np.zeros((7, 7))
+        data, site = self._data, self._scene.tip_site
+        self._tip, self._rotation = data.site_xpos[site], data.site_xmat[site].reshape(3, 3)
+        self._axes, self._anchors = data.xaxis, data.xanchor
 
     @property
     def scene(self) -> Scene:
@@ -95,6 +89,14 @@ class ArmModel:
         self._place(q)
         return self._read_dynamics(v)
 
+    def jacobians(self, q: Array) -> Array:
+        """Tip Jacobians (n, 6, 7), translation above rotation, at joint positions `q` (n, 7) [rad]."""
+        J = np.empty((len(q), 6, 7))
+        for row, jacobian in zip(q, J, strict=True):
+            self._place(row)
+            mujoco.mj_jacSite(self._model, self._data, jacobian[:3], jacobian[3:], self._scene.tip_site)
+        return J
+
     def evaluate(self, q: Array, v: Array) -> tuple[Kinematics, Dynamics]:
         """Both at once, for one placement of the model."""
         self._place(q)
@@ -106,34 +108,22 @@ class ArmModel:
         mujoco.mj_comPos(self._model, self._data)
 
     def _read_kinematics(self) -> Kinematics:
-        data, site = self._data, self._scene.tip_site
-        mujoco.mj_jacSite(self._model, data, self._jacp, self._jacr, site)
+        Jv, Jw = np.empty((3, 7)), np.empty((3, 7))
+        mujoco.mj_jacSite(self._model, self._data, Jv, Jw, self._scene.tip_site)
         return Kinematics(
-            p_WT=data.site_xpos[site].copy(),
-            R_WT=data.site_xmat[site].reshape(3, 3).copy(),
-            Jv_WT=self._jacp.copy(),
-            Jw_WT=self._jacr.copy(),
-            z_W=data.xaxis.copy(),
-            anchors_W=data.xanchor.copy(),
+            p_WT=self._tip.copy(),
+            R_WT=self._rotation.copy(),
+            Jv_WT=Jv,
+            Jw_WT=Jw,
+            z_W=self._axes.copy(),
+            anchors_W=self._anchors.copy(),
         )
 
     def _read_dynamics(self, v: Array) -> Dynamics:
-        model, data, site = self._model, self._data, self._scene.tip_site
-        gravity, bias = np.zeros(7), np.zeros(7)
-        data.qvel[:] = 0.0
-        mujoco.mj_comVel(model, data)
-        mujoco.mj_rne(model, data, 0, gravity)
+        model, data, bias, M = self._model, self._data, np.empty(7), np.empty((7, 7))
         data.qvel[:] = v
         mujoco.mj_comVel(model, data)
         mujoco.mj_rne(model, data, 0, bias)
         mujoco.mj_makeM(model, data)
-        mujoco.mj_fullM(model, data, self._full)
-        body = int(model.site_bodyid[site])
-        mujoco.mj_jacDot(model, data, self._jacp, self._jacr, data.site_xpos[site], body)
-        return Dynamics(
-            mass_matrix=self._full.copy(),
-            bias=bias,
-            gravity=gravity,
-            Jv_dot_v=self._jacp @ v,
-            Jw_dot_v=self._jacr @ v,
-        )
+        mujoco.mj_fullM(model, data, M)
+        return Dynamics(mass_matrix=M, bias=bias)

@@ -1,6 +1,5 @@
 """Composition of a scene from its config, and the names in it resolved to ids once."""
 
-import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
@@ -34,7 +33,6 @@ class Scene:
 
     Attributes:
         model: The compiled MuJoCo model.
-        spec_sha256: Hash of the MJCF that it was compiled from.
         qpos_ids: Where the arm's positions are in `qpos` (7,).
         dof_ids: Where its velocities are in `qvel` (7,).
         actuator_ids: Where its motors are in `ctrl` (7,).
@@ -47,7 +45,6 @@ class Scene:
     """
 
     model: mujoco.MjModel
-    spec_sha256: str
     qpos_ids: Ids
     dof_ids: Ids
     actuator_ids: Ids
@@ -115,7 +112,6 @@ def _compile(spec: mujoco.MjSpec) -> Scene:
     port = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, "port")
     return Scene(
         model=model,
-        spec_sha256=hashlib.sha256(spec.to_xml().encode()).hexdigest(),
         qpos_ids=_ids([joint.qposadr[0] for joint in joints]),
         dof_ids=_ids([joint.dofadr[0] for joint in joints]),
         actuator_ids=_ids([model.actuator(name).id for name in MOTORS]),

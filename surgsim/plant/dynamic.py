@@ -11,7 +11,7 @@ from surgsim.catalog import PartConfig
 from surgsim.models.build import Scene
 from surgsim.plant.disturbances.base import Disturbance
 from surgsim.plant.state import State
-from surgsim.plant.truth import Truth, TruthReader
+from surgsim.plant.truth import Truth, TruthReader, arm_view
 
 Array = NDArray[np.float64]
 _AT_REST = np.zeros(3)
@@ -57,6 +57,9 @@ class DynamicPlant:
         self._disturbances = tuple(disturbances)
         self._seed = seed or np.random.SeedSequence(0)
         self._data = mujoco.MjData(scene.model)
+        self._qpos = arm_view(self._data.qpos, scene.qpos_ids)
+        self._qvel = arm_view(self._data.qvel, scene.dof_ids)
+        self._ctrl = arm_view(self._data.ctrl, scene.actuator_ids)
         self._dt = control_period_s
         self._substeps = round(control_period_s / scene.model.opt.timestep)
         self._tick = 0
@@ -67,7 +70,7 @@ class DynamicPlant:
     def reset(self, q: Array) -> State:
         """Put the arm at rest at joint positions `q` (7,) [rad]."""
         mujoco.mj_resetData(self._scene.model, self._data)
-        self._data.qpos[self._scene.qpos_ids] = q
+        self._qpos[:] = q
         self._tick = 0
         self._tau = np.zeros(7)
         children = np.random.SeedSequence(self._seed.entropy, spawn_key=self._seed.spawn_key).spawn(
@@ -88,7 +91,7 @@ class DynamicPlant:
                 torque = disturbance.delay(torque)
                 disturbance.push(self._tick * self._dt, self._scene, data)
         self._tau = torque
-        data.ctrl[self._scene.actuator_ids] = torque
+        self._ctrl[:] = torque
         mujoco.mj_step2(model, data)
         for _ in range(self._substeps - 1):
             mujoco.mj_step(model, data)
@@ -101,12 +104,11 @@ class DynamicPlant:
         return self._truth
 
     def _state(self) -> State:
-        data, scene = self._data, self._scene
         self._truth = self._reader.read()
         return State(
             t_s=self._tick * self._dt,
-            q=data.qpos[scene.qpos_ids],
-            v=data.qvel[scene.dof_ids],
+            q=self._qpos.copy(),
+            v=self._qvel.copy(),
             tau=self._tau,
             p_WC=self._truth.p_WC,
             v_WC=_AT_REST,

@@ -27,6 +27,14 @@ class Truth:
     p_WC: Array
 
 
+def arm_view(values: Array, ids: NDArray[np.intp]) -> Array:
+    """The arm's part of one of MuJoCo's vectors, not copied; its seven entries follow each other."""
+    first = int(ids[0])
+    if not np.array_equal(ids, np.arange(first, first + len(ids))):
+        raise ValueError(f"the arm's entries {ids} do not follow each other")
+    return values[first : first + len(ids)]
+
+
 class TruthReader:
     """Copies the points out of MuJoCo's data."""
 

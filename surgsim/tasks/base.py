@@ -95,7 +95,7 @@ class PathTask:
         self._shape = shape
         self._profile = profile
         self._start = start
-        self._R_WP = R_WP
+        self._R_PW = R_WP.T.copy()
 
     @property
     def duration_s(self) -> float:
@@ -105,7 +105,7 @@ class PathTask:
     def command(self, t_s: float) -> TipCommand:
         """Desired tip motion at `t_s` [s]: p(s), p' s', p'' s'^2 + p' s''."""
         s, s_dot, s_ddot = self._profile.progress(t_s)
-        p, dp, ddp = self._shape.shape(s) @ self._R_WP.T
+        p, dp, ddp = self._shape.shape(s) @ self._R_PW
         return TipCommand(
             p_WTd=self._start + p,
             v_WTd=dp * s_dot,

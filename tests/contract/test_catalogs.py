@@ -179,14 +179,14 @@ def test_torque_law_holds_an_arm_that_is_where_it_should_be(arm, torque_problem,
         p,
         v=zero7,
         dyn=dyn,
-        tau_measured=dyn.gravity,
+        tau_measured=dyn.bias,
         command=replace(p.command, p_WTd=p.kin.p_WT, v_WTd=zero3, a_WTd=zero3),
         resolution=replace(p.resolution, qdot=zero7),
         q_ref=p.q,
     )
     law = TORQUE_LAWS.config(name)().build(arm)
     terms, _ = law.torque(p, law.start(p))
-    np.testing.assert_allclose(terms.sum(axis=0), dyn.gravity, atol=1e-9)
+    np.testing.assert_allclose(terms.sum(axis=0), dyn.bias, atol=1e-9)
 
 
 @every_task

@@ -5,6 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from surgsim.control.manipulability import velocity_product_accelerations
 from surgsim.control.rcm import rcm_bias_acceleration, rcm_cross_form, rcm_kinematics
 from surgsim.models.arm import ArmModel
 from surgsim.models.config import RobotConfig, SceneConfig
@@ -53,10 +54,10 @@ def test_rate_of_the_error_with_arm_and_trocar_moving(arm, motion):
 @seeds
 def test_second_derivative_of_the_error(arm, motion):
     m, h = motion, 1e-4
-    kin, dyn = arm.evaluate(m.q, m.v)
+    kin = arm.kinematics(m.q)
     rcm = rcm_kinematics(kin, m.C, m.V)
     second = rcm.normals @ (m.error(h) - 2 * m.error(0.0) + m.error(-h)) / h**2
-    bias = rcm_bias_acceleration(kin, m.v, m.C, m.V, dyn.Jv_dot_v, dyn.Jw_dot_v)
+    bias = rcm_bias_acceleration(kin, m.v, m.C, m.V, *velocity_product_accelerations(kin, m.v))
     np.testing.assert_allclose(rcm.jacobian @ m.a + bias, second, atol=1e-5)
     assert np.linalg.norm(bias) > 0.01
 
@@ -130,12 +131,12 @@ def test_results_do_not_depend_on_the_world_frame(arm, velocity_problem, seed, p
     v = np.linspace(-1.0, 1.0, 7)
     p_WC = np.array(place) + R @ p.p_WC
     here = rcm_kinematics(p.kin, p.p_WC, V)
-    kin, dyn = moved.evaluate(p.q, v)
+    kin = moved.kinematics(p.q)
     there = rcm_kinematics(kin, p_WC, R @ V)
     for name in ("error", "jacobian", "trocar_velocity", "depth"):
         np.testing.assert_allclose(getattr(there, name), getattr(here, name), atol=1e-12)
-    for_bias = [(kin, dyn, p_WC, R @ V), (*arm.evaluate(p.q, v), p.p_WC, V)]
+    for_bias = [(kin, p_WC, R @ V), (p.kin, p.p_WC, V)]
     moved_bias, bias = (
-        rcm_bias_acceleration(k, v, C, v_WC, d.Jv_dot_v, d.Jw_dot_v) for k, d, C, v_WC in for_bias
+        rcm_bias_acceleration(k, v, C, v_WC, *velocity_product_accelerations(k, v)) for k, C, v_WC in for_bias
     )
     np.testing.assert_allclose(moved_bias, bias, atol=1e-10)

@@ -20,6 +20,7 @@ from surgsim.spatial import cross
 
 Array = NDArray[np.float64]
 _DIVERGED = 1e12
+_NO_ROWS = np.zeros((0, 7))
 
 
 class VprnnConfig(PartConfig):
@@ -111,6 +112,7 @@ class Vprnn:
 
     def __init__(self, config: VprnnConfig) -> None:
         self._c = config
+        self._bound = math.inf if config.activation_bound is None else config.activation_bound
         self._solve = _rank_revealing_solve if config.rcm_rows == "cross" else solve
 
     def start(self, problem: VelocityProblem) -> VprnnMemory:
@@ -119,38 +121,32 @@ class Vprnn:
 
     def step(self, problem: VelocityProblem, memory: VprnnMemory) -> tuple[Resolution, VprnnMemory]:
         """One control period of the network, and its joint velocities projected on Omega."""
-        terms = self.terms(problem)
+        J_rcm, v_d, v_rcm = self._rows(problem)
+        J = np.concatenate((problem.kin.Jv_WT, J_rcm))
         if self._c.integration == "exact":
-            qdot, memory = self._step_exact(terms, problem, memory)
+            qdot, memory = self._step_exact(problem, J, v_d, v_rcm, memory)
         else:
-            qdot, memory = self._step_euler(terms, problem, memory)
+            qdot, memory = self._step_euler(self.terms(problem), problem, memory)
         if not np.abs(qdot).max() < _DIVERGED:
-            raise ControlFailure(
-                Outcome.DIVERGED, "VPRNN: a joint velocity of the network exceeds 1e12 rad/s"
-            )
-        J = np.concatenate((terms.J, terms.J_rcm))
-        return bounded_resolution(problem, qdot, J, np.concatenate([terms.v_d, terms.v_rcm])), memory
+            raise ControlFailure(Outcome.DIVERGED, "VPRNN: a joint velocity exceeds 1e12 rad/s")
+        return bounded_resolution(problem, qdot, J, np.concatenate((v_d, v_rcm))), memory
+
+    def _rows(self, problem: VelocityProblem) -> tuple[Array, Array, Array]:
+        """J_rcm (r, 7), v_d (3,) and v_rcm (r,) of eq. (20)."""
+        v_d = problem.command.v_WTd - self._c.k1 * problem.tip_error
+        if problem.rcm is None:
+            return _NO_ROWS, v_d, _NO_ROWS[:, 0]
+        if self._c.rcm_rows == "cross":
+            error, J_rcm = rcm_cross_form(problem.kin, problem.p_WC)
+            return J_rcm, v_d, cross(problem.kin.R_WT[:, 2], problem.v_WC) - self._c.k2 * error
+        return problem.rcm.jacobian, v_d, problem.rcm.trocar_velocity - self._c.k2 * problem.rcm.error
 
     def terms(self, problem: VelocityProblem) -> Terms:
         """Building blocks of W and l."""
-        kin = problem.kin
-        J = kin.Jv_WT
-        if problem.rcm is None:
-            J_rcm, v_rcm = np.zeros((0, 7)), np.zeros(0)
-        elif self._c.rcm_rows == "cross":
-            error, J_rcm = rcm_cross_form(kin, problem.p_WC)
-            v_rcm = cross(kin.R_WT[:, 2], problem.v_WC) - self._c.k2 * error
-        else:
-            J_rcm = problem.rcm.jacobian
-            v_rcm = problem.rcm.trocar_velocity - self._c.k2 * problem.rcm.error
-        return Terms(
-            J=J,
-            J_rcm=J_rcm,
-            D=diamond(J, jacobian_gradient(J, kin.z_W)),
-            A=J @ J.T,
-            v_d=problem.command.v_WTd - self._c.k1 * problem.tip_error,
-            v_rcm=v_rcm,
-        )
+        J = problem.kin.Jv_WT
+        J_rcm, v_d, v_rcm = self._rows(problem)
+        D = diamond(J, jacobian_gradient(J, problem.kin.z_W))
+        return Terms(J=J, J_rcm=J_rcm, D=D, A=J @ J.T, v_d=v_d, v_rcm=v_rcm)
 
     def system(self, t: Terms) -> tuple[Array, Array]:
         """W (7 + 18 + 3 + r) square and l of eq. (25)."""
@@ -169,30 +165,12 @@ class Vprnn:
         return W, l
 
     def decay(self, delta: Array, t_s: float, dt_s: float) -> Array:
-        """Delta after one period: the closed form of eq. (27) with the activation (28).
+        """Error delta after one period: the closed form of eq. (27) with the activation (28)."""
+        return _decay(delta, self._progress(t_s, dt_s), self._bound)
 
-        With tau = beta * integral of min(exp(t), exp(cap)), the linear range decays as exp(-tau); a
-        saturated entry falls at the rate of its bound until it reaches it.
-        """
-        tau = self._c.beta * _capped_exponential_integral(t_s, t_s + dt_s, self._c.exponent_cap)
-        bound = self._c.activation_bound
-        if bound is None:
-            return delta * math.exp(-tau)
-        size = np.abs(delta)
-        until = np.maximum(size - bound, 0.0) / bound
-        left = np.maximum(tau - until, 0.0)
-        fallen = np.where(until >= tau, size - bound * tau, np.minimum(size, bound) * np.exp(-left))
-        return np.asarray(np.copysign(fallen, delta))
-
-    def _step_exact(self, t: Terms, p: VelocityProblem, memory: VprnnMemory) -> tuple[Array, VprnnMemory]:
-        right = self._right_side(t)
-        delta = self.decay(-right if memory.delta is None else memory.delta, p.t_s, p.dt_s)
-        return self.recover_qdot(t, right + delta), VprnnMemory(delta=delta)
-
-    def _right_side(self, t: Terms) -> Array:
-        """L of eq. (25), without W."""
-        c = self._c
-        return _right_side(t.J, t.J_rcm, t.A, t.v_d, t.v_rcm, c.h2, c.h3, c.h4)
+    def _progress(self, t_s: float, dt_s: float) -> float:
+        """The decay exponent: beta * integral of min(exp(t), exp(cap)) over one period."""
+        return self._c.beta * _capped_exponential_integral(t_s, t_s + dt_s, self._c.exponent_cap)
 
     def recover_qdot(self, t: Terms, rhs: Array) -> Array:
         """Q' (7,) of W z = rhs through the block structure of W.
@@ -201,60 +179,101 @@ class Vprnn:
             numpy.linalg.LinAlgError: If W is singular and the rows are `normal`.
         """
         c = self._c
-        K, b = _kkt(t.J, t.J_rcm, t.A, t.D, rhs, c.h0, c.h1, c.h2, c.h3)
-        if c.rcm_rows == "cross":
-            return _rank_revealing_solve(K, b)[:7]
-        return solve(K, b)[:7]
+        K, b = _kkt(np.concatenate((t.J, t.J_rcm)), t.A, t.D, rhs, c.h0, c.h1, c.h2, c.h3)
+        return self._solve(K, b)[:7]
+
+    def _step_exact(
+        self, p: VelocityProblem, J: Array, v_d: Array, v_rcm: Array, memory: VprnnMemory
+    ) -> tuple[Array, VprnnMemory]:
+        c = self._c
+        delta = _NO_ROWS[:, 0] if memory.delta is None else memory.delta
+        tau = self._progress(p.t_s, p.dt_s)
+        K, b, delta = _exact_system(
+            J, p.kin.z_W, v_d, v_rcm, delta, tau, self._bound, c.h0, c.h1, c.h2, c.h3, c.h4
+        )
+        return self._solve(K, b)[:7], VprnnMemory(delta=delta)
 
     def _step_euler(self, t: Terms, p: VelocityProblem, memory: VprnnMemory) -> tuple[Array, VprnnMemory]:
-        """Explicit Euler z += T W^-1 (-W' z + l' - beta exp(t) phi(W z - l)), eq. (29), with backward differences."""
+        """Explicit Euler of eq. (29), z' = W^-1 (-W' z + l' - beta exp(t) phi(W z - l)); W', l' backward."""
         W, l = self.system(t)  # noqa: E741
         z = np.zeros(len(l)) if memory.z is None else memory.z
         W_old = W if memory.W is None else memory.W
         l_old = l if memory.l is None else memory.l
         gain = self._c.beta * math.exp(min(p.t_s, self._c.exponent_cap))
         delta = W @ z - l
-        bound = math.inf if self._c.activation_bound is None else self._c.activation_bound
-        phi = np.clip(delta, -bound, bound)
+        phi = np.clip(delta, -self._bound, self._bound)
         z_dot = self._solve(W, (l - l_old - (W - W_old) @ z) / p.dt_s - gain * phi)
         z = z + p.dt_s * z_dot
         return z[:7].copy(), VprnnMemory(z=z, W=W, l=l)
 
 
 @compiled
-def _right_side(
-    J: Array, J_rcm: Array, A: Array, v_d: Array, v_rcm: Array, h2: float, h3: float, h4: float
-) -> Array:
-    r = J_rcm.shape[0]
-    right = np.empty(28 + r)
-    right[:7] = h2 * (v_d @ J) + h3 * (v_rcm @ J_rcm)
-    right[7:16] = h4 * A.ravel()
-    right[16:19] = v_d
-    right[19 : 19 + r] = v_rcm
-    right[19 + r :] = np.eye(3).ravel()
-    return right
+def _decay(delta: Array, tau: float, bound: float) -> Array:
+    """The linear range decays as exp(-tau); a saturated entry falls at its bound's rate until then."""
+    out = np.empty(delta.size)
+    for i in range(delta.size):
+        size = abs(delta[i])
+        until = max(size - bound, 0.0) / bound if bound < np.inf else 0.0
+        left = min(size, bound) * np.exp(-(tau - until)) if until < tau else size - bound * tau
+        out[i] = left if delta[i] > 0.0 else -left
+    return out
 
 
 @compiled
 def _kkt(
-    J: Array, J_rcm: Array, A: Array, D: Array, rhs: Array, h0: float, h1: float, h2: float, h3: float
+    J: Array, A: Array, D: Array, rhs: Array, h0: float, h1: float, h2: float, h3: float
 ) -> tuple[Array, Array]:
-    """Rows of W z = rhs that hold q', lambda1 and lambda2, with psi solved from the last rows."""
-    r = J_rcm.shape[0]
-    columns = rhs[19 + r :].copy().reshape(3, 3).T
+    """Rows of W z = rhs that hold q', lambda1 and lambda2, with psi solved from the last rows.
+
+    J stacks J_T on J_rcm, (3 + r, 7).
+    """
+    m = J.shape[0]
+    columns = rhs[16 + m :].copy().reshape(3, 3).T
     psi = np.linalg.solve(A, columns).T.copy().ravel()
-    K = np.zeros((10 + r, 10 + r))
-    K[:7, :7] = h2 * (J.T @ J) + h3 * (J_rcm.T @ J_rcm)
+    K = np.zeros((7 + m, 7 + m))
     for i in range(7):
+        for j in range(i, 7):
+            for k in range(m):
+                K[i, j] += (h2 if k < 3 else h3) * J[k, i] * J[k, j]
+            K[j, i] = K[i, j]
         K[i, i] += h1
-    K[:7, 7:10] = -J.T
-    K[:7, 10:] = -J_rcm.T
-    K[7:10, :7] = J
-    K[10:, :7] = J_rcm
-    b = np.empty(10 + r)
+        for k in range(m):
+            K[i, 7 + k] = -J[k, i]
+            K[7 + k, i] = J[k, i]
+    b = np.empty(7 + m)
     b[:7] = rhs[:7] + h0 * (D @ psi)
-    b[7:] = rhs[16 : 19 + r]
+    b[7:] = rhs[16 : 16 + m]
     return K, b
+
+
+@compiled
+def _exact_system(
+    J: Array,
+    z: Array,
+    v_d: Array,
+    v_rcm: Array,
+    delta: Array,
+    tau: float,
+    bound: float,
+    h0: float,
+    h1: float,
+    h2: float,
+    h3: float,
+    h4: float,
+) -> tuple[Array, Array, Array]:
+    """The KKT system of one exact step, and delta after it; an empty `delta` stands for z = 0."""
+    J_T = J[:3]
+    A = J_T @ J_T.T
+    m = J.shape[0]
+    right = np.empty(25 + m)
+    right[:7] = h2 * (v_d @ J_T) + h3 * (v_rcm @ J[3:])
+    right[7:16] = h4 * A.ravel()
+    right[16:19] = v_d
+    right[19 : 16 + m] = v_rcm
+    right[16 + m :] = np.eye(3).ravel()
+    delta = _decay(-right if delta.size == 0 else delta, tau, bound)
+    K, b = _kkt(J, A, diamond(J_T, jacobian_gradient(J_T, z)), right + delta, h0, h1, h2, h3)
+    return K, b, delta
 
 
 def _rank_revealing_solve(A: Array, b: Array) -> Array:

@@ -70,15 +70,26 @@ class HierarchicalImpedance:
 
     def torque(self, problem: TorqueProblem, memory: None) -> tuple[Array, None]:
         """Rows tip, rcm, joint, bias (4, 7) [N m]."""
-        p, kin, command = problem, problem.kin, problem.command
-        if p.rcm is None:
-            J_r, F_r = _NO_ROWS, _NO_ROWS[:, 0]
-        else:
-            J_r = p.rcm.jacobian
-            F_r = -self._K_N * p.rcm.error - self._D_N * (J_r @ p.v - p.rcm.trocar_velocity)
-        F_T = self._K_X * (command.p_WTd - kin.p_WT) + self._D_X * (command.v_WTd - kin.Jv_WT @ p.v)
-        tau_joint = self._K_N2 * (p.q_ref - p.q) + self._D_N2 * (p.resolution.qdot - p.v)
-        return _hierarchy(p.dyn.mass_matrix, p.dyn.bias, kin.Jv_WT, J_r, F_T, F_r, tau_joint), None
+        p, kin, command, rcm = problem, problem.kin, problem.command, problem.rcm
+        return _hierarchy(
+            p.dyn.mass_matrix,
+            p.dyn.bias,
+            kin.Jv_WT,
+            command.p_WTd - kin.p_WT,
+            command.v_WTd,
+            _NO_ROWS if rcm is None else rcm.jacobian,
+            _NO_ROWS[:, 0] if rcm is None else rcm.error,
+            _NO_ROWS[:, 0] if rcm is None else rcm.trocar_velocity,
+            p.q_ref - p.q,
+            p.resolution.qdot,
+            p.v,
+            self._K_X,
+            self._D_X,
+            self._K_N,
+            self._D_N,
+            self._K_N2,
+            self._D_N2,
+        ), None
 
 
 _NO_ROWS = np.zeros((0, 7))
@@ -86,15 +97,33 @@ _NO_ROWS = np.zeros((0, 7))
 
 @compiled
 def _hierarchy(
-    M: Array, bias: Array, J_T: Array, J_r: Array, F_T: Array, F_r: Array, tau_joint: Array
+    M: Array,
+    bias: Array,
+    J_T: Array,
+    tip_gap: Array,
+    v_d: Array,
+    J_r: Array,
+    error: Array,
+    trocar_velocity: Array,
+    joint_gap: Array,
+    qdot_ref: Array,
+    v: Array,
+    K_X: Array,
+    D_X: Array,
+    K_N: float,
+    D_N: float,
+    K_N2: Array,
+    D_N2: Array,
 ) -> Array:
     """Rows tip, rcm, joint, bias of the torque (4, 7) [N m]."""
+    F_T = K_X * tip_gap + D_X * (v_d - J_T @ v)
+    F_r = -K_N * error - D_N * (J_r @ v - trocar_velocity)
     J = np.concatenate((J_T, J_r))
     JMinv = np.ascontiguousarray(np.linalg.solve(M, J.T).T)
     out = np.empty((4, 7))
     out[0] = F_T @ J_T
     out[1] = null_space_torque(J_T, JMinv[:3], F_r @ J_r)
-    out[2] = null_space_torque(J, JMinv, tau_joint)
+    out[2] = null_space_torque(J, JMinv, K_N2 * joint_gap + D_N2 * (qdot_ref - v))
     out[3] = bias
     return out
 

@@ -97,7 +97,7 @@ def test_at_rest_at_the_reference_only_the_bias_is_left(arm, problem):
         q_ref=p.q,
     )
     terms = _torque(p)
-    np.testing.assert_allclose(terms.sum(axis=0), arm.dynamics(p.q, still).gravity, atol=1e-10)
+    np.testing.assert_allclose(terms.sum(axis=0), arm.dynamics(p.q, still).bias, atol=1e-10)
     np.testing.assert_allclose(terms[:BIAS], 0.0, atol=1e-10)
 
 
