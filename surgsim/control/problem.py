@@ -136,7 +136,7 @@ def braking_bounds(problem: VelocityProblem, last: Array) -> tuple[Array, Array]
 
 
 @compiled
-def _stopping_speed(room: float, a: float, gain: float, dt: float) -> float:
+def stopping_speed(room: float, a: float, gain: float, dt: float) -> float:
     """Speed from which `a` suffices to stay below gain * room, Omega's bound, until standstill.
 
     The parabola of constant deceleration meets the line gain * room with equal slope at the speed a / gain.
@@ -164,8 +164,8 @@ def _braking_bounds(
     low, high = np.empty(7), np.empty(7)
     for i in range(7):
         reach = a[i] * dt
-        high[i] = min(upper[i], max(_stopping_speed(q_max[i] - q[i], a_stop[i], gain, dt), lower[i]))
-        low[i] = max(lower[i], min(-_stopping_speed(q[i] - q_min[i], a_stop[i], gain, dt), upper[i]))
+        high[i] = min(upper[i], max(stopping_speed(q_max[i] - q[i], a_stop[i], gain, dt), lower[i]))
+        low[i] = max(lower[i], min(-stopping_speed(q[i] - q_min[i], a_stop[i], gain, dt), upper[i]))
         fastest, slowest = last[i] + reach, last[i] - reach
         high[i] = min(high[i], fastest) if fastest >= low[i] else low[i]
         low[i] = max(low[i], slowest) if slowest <= high[i] else high[i]

@@ -7,5 +7,7 @@ TORQUE_LAWS = Catalog(
     "surgsim.torque_laws",
     {
         "hierarchical_impedance": f"{__name__}.hierarchical_impedance:HierarchicalImpedanceConfig",
+        "joint_impedance": f"{__name__}.joint_impedance:JointImpedanceConfig",
+        "rcm_inverse_dynamics": f"{__name__}.rcm_inverse_dynamics:RcmInverseDynamicsConfig",
     },
 )

@@ -1,0 +1,69 @@
+"""A push on the instrument or the arm."""
+
+import math
+from typing import Annotated, Literal
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field, NonNegativeFloat, PositiveFloat
+
+from surgsim.catalog import PartConfig
+from surgsim.models.build import Scene
+from surgsim.models.config import Vec3
+from surgsim.plant.disturbances.base import Disturbance
+
+Array = NDArray[np.float64]
+
+
+class PushConfig(PartConfig):
+    """A constant force for a while, with smooth edges, on the tip or on a link's frame origin.
+
+    Attributes:
+        force_n: Force in the world frame [N].
+        at: Where it acts: `tip`, `elbow` (link 4) or `wrist` (link 6).
+        start_s: When it begins [s].
+        duration_s: How long it lasts [s].
+        rise_s: Time of each of its edges [s].
+    """
+
+    type: Literal["push"] = "push"
+    force_n: Vec3 = (5.0, 0.0, 0.0)
+    at: Literal["tip", "elbow", "wrist"] = "tip"
+    start_s: NonNegativeFloat = 3.0
+    duration_s: PositiveFloat = 3.0
+    rise_s: Annotated[float, Field(gt=0.0, le=10.0)] = 0.05
+
+    def build(self) -> "Push":
+        """The disturbance."""
+        return Push(self)
+
+
+class Push(Disturbance):
+    """Adds the force to `xfrc_applied` of the body that carries the point, with its moment."""
+
+    def __init__(self, config: PushConfig) -> None:
+        self._c = config
+        self._force = np.array(config.force_n)
+
+    def push(self, t_s: float, scene: Scene, data: mujoco.MjData) -> None:
+        """Add the force at `t_s` [s]."""
+        level = self.level(t_s)
+        if level == 0.0:
+            return
+        body, point = self._place(scene, data)
+        force = level * self._force
+        data.xfrc_applied[body, :3] += force
+        data.xfrc_applied[body, 3:] += np.cross(point - data.xipos[body], force)
+
+    def level(self, t_s: float) -> float:
+        """Share of the force that acts at `t_s` [s]: raised cosine edges."""
+        t = t_s - self._c.start_s
+        edge = min(t, self._c.duration_s - t) / self._c.rise_s
+        return 0.5 - 0.5 * math.cos(math.pi * min(edge, 1.0)) if edge > 0.0 else 0.0
+
+    def _place(self, scene: Scene, data: mujoco.MjData) -> tuple[int, Array]:
+        if self._c.at == "tip":
+            return int(scene.model.site_bodyid[scene.tip_site]), data.site_xpos[scene.tip_site]
+        body = int(scene.model.body({"elbow": "link4", "wrist": "link6"}[self._c.at]).id)
+        return body, data.xpos[body]
