@@ -130,7 +130,8 @@ def sections():
             if config.__module__.startswith("surgsim."):
                 found[f"{catalog.kind}: {name}"] = config
                 for key, field in config.model_fields.items():
-                    for part in inner(field.annotation):
+                    parts = [part for part in inner(field.annotation) if "type" not in part.model_fields]
+                    for part in parts:  # one with a type is in a catalog and has its own section
                         found[f"{catalog.kind}: {name}, {key}"] = part
     return [pytest.param(heading, config, id=heading) for heading, config in found.items()]
 

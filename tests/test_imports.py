@@ -29,6 +29,9 @@ LAYERS = (
     "surgsim.metrics",
     "surgsim.recording",
     "surgsim.runs",
+    "surgsim.env",
+    "surgsim.compare",
+    "surgsim.report",
     "surgsim.studies",
     "surgsim.cli",
     "surgsim.__main__",
@@ -36,7 +39,7 @@ LAYERS = (
 # Who may import what, where it is not everyone.
 ONLY = {
     "rerun": ("surgsim.recording",),
-    "pyarrow": ("surgsim.recording", "surgsim.studies"),
+    "pyarrow": ("surgsim.compare", "surgsim.recording", "surgsim.studies"),
     "mujoco": (
         "surgsim.models",
         "surgsim.plant",
@@ -50,6 +53,9 @@ ONLY = {
     "argparse": ("surgsim.cli",),
     "rich": ("surgsim.cli",),
     "matplotlib": ("surgsim.studies",),
+    "dm_control": ("surgsim.env",),
+    "dm_env": ("surgsim.env",),
+    "gymnasium": ("surgsim.env.gymnasium",),
 }
 ROOT = Path(surgsim.__file__).parent
 

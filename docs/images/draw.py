@@ -1,4 +1,4 @@
-"""Draws `theatre.png` and `port_closeup.png`: the start of the circle scenario. Needs OpenGL."""
+"""Draws `theatre.png`, `port_closeup.png` and `panda.png`: starts of the circle scenarios. Needs OpenGL."""
 
 import sys
 from pathlib import Path
@@ -11,18 +11,21 @@ from surgsim.models.picture import render
 from surgsim.scenario.load import load_scenario
 from surgsim.simulate.setup import prepare
 
-PICTURES = {"theatre.png": "overview", "port_closeup.png": "port_closeup"}
+PICTURES = {
+    "theatre.png": ("circle_lwr4plus", "overview"),
+    "port_closeup.png": ("circle_lwr4plus", "port_closeup"),
+    "panda.png": ("circle_panda", "overview"),
+}
 
 
 def main() -> int:
     """Write the pictures beside this file."""
-    scenario = load_scenario("circle_lwr4plus")
-    q = prepare(scenario).q_start
-    scene = build(scenario.scene)
-    for name, camera in PICTURES.items():
+    for name, (scenario_name, camera) in PICTURES.items():
+        scenario = load_scenario(scenario_name)
+        q = prepare(scenario).q_start
         path = Path(__file__).with_name(name)
         try:
-            pixels = render(scene, q, camera)
+            pixels = render(build(scenario.scene), q, camera)
         except SurgsimError as error:
             print(error, file=sys.stderr)
             return 1

@@ -8,46 +8,83 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from surgsim.recording.read import Recorded
     from surgsim.trace.trace import Trace
 
-HELP = "look into a recorded run"
+HELP = "look into a recorded run, two of them, or a batch"
 EXAMPLES = """The metrics are computed again from the recording alone and compared with those stored in it.
+Two runs are compared and shown side by side on one timeline. A batch's folder lists its runs.
 
 examples:
   surgsim inspect runs/circle_lwr4plus/vprnn-seed0
   surgsim inspect recording.rrd --view
   surgsim inspect recording.rrd --export run.parquet
+  surgsim inspect runs/circle_lwr4plus/vprnn-seed0 runs/circle_lwr4plus/pinv-seed0 --view
+  surgsim inspect runs/suites/quick
+  surgsim inspect runs/suites/quick --run circle_lwr4plus/vprnn/base-seed0 --view
 """
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
-    parser.add_argument("path", type=Path, metavar="FILE.rrd|RUN_DIR", help="a recording or a run's folder")
+    parser.add_argument(
+        "paths", type=Path, nargs="+", metavar="FILE.rrd|DIR", help="a recording, a run's or a batch's folder"
+    )
     shown = parser.add_mutually_exclusive_group()
     shown.add_argument("--view", action="store_true", help="open the viewer")
     shown.add_argument("--web", action="store_true", help="serve the viewer on 127.0.0.1 for a browser")
-    parser.add_argument(
-        "--export", type=Path, metavar="FILE.parquet|FILE.csv", help="write every control tick"
-    )
+    parser.add_argument("--run", metavar="RUN_ID", help="which run of a batch's folder")
+    parser.add_argument("--out", type=Path, metavar="FILE.rrd", help="where two runs' recording is kept")
+    parser.add_argument("--export", type=Path, metavar="FILE.parquet|.csv", help="write every control tick")
     parser.add_argument("--json", action="store_true", help="print JSON instead of a table")
 
 
 def execute(options: argparse.Namespace) -> int:
-    """Print the metrics; 1 if they differ from those stored, or if the run did not complete."""
+    """Print what was asked for; 1 if metrics differ from those stored, or a run did not complete."""
+    from surgsim.errors import SurgsimError
+
+    paths = [_run_of(path, options.run) if options.run else path for path in options.paths]
+    if len(paths) == 1 and (paths[0] / "runs.parquet").is_file():
+        return _list_batch(paths[0], options)
+    if len(paths) == 2:
+        return _two(paths, options)
+    if len(paths) > 2:
+        raise SurgsimError("inspect takes one recording, two, or a batch's folder")
+    return _one(paths[0], options)
+
+
+def _run_of(path: Path, run_id: str) -> Path:
+    from surgsim.compare.table import read_table
+    from surgsim.errors import SurgsimError, unknown_name
+
+    table = read_table(path)
+    folders = dict(zip(table["run_id"].to_pylist(), table["folder"].to_pylist(), strict=True))
+    if run_id not in folders:
+        known = list(folders)[:20]
+        raise SurgsimError(unknown_name(run_id, f"run of {path}", known))
+    folder: str = folders[run_id]
+    return path / folder
+
+
+def _one(path: Path, options: argparse.Namespace) -> int:
     from surgsim.errors import Outcome
     from surgsim.metrics.catalog import compute_metrics
+    from surgsim.recording import view
     from surgsim.recording.export import export
     from surgsim.recording.read import read_recording
     from surgsim.recording.stored import differences
 
-    recorded = read_recording(options.path)
+    recorded = read_recording(path)
     metrics = compute_metrics(recorded.trace)
     found = differences(recorded.metrics, metrics)
     _print(recorded.trace, metrics, found, as_json=options.json)
     if options.export:
         export(recorded.trace, options.export)
         print(f"wrote {options.export}, {len(recorded.trace)} rows", file=sys.stderr)
-    _show(options)
+    if options.view:
+        view.view(path)
+    elif options.web:
+        view.serve(path)
     return 0 if not found and recorded.trace.meta.ending.outcome is Outcome.COMPLETED else 1
 
 
@@ -75,10 +112,59 @@ def _print(trace: "Trace", metrics: Mapping[str, float | None], found: list[str]
         print(f"  {line}")
 
 
-def _show(options: argparse.Namespace) -> None:
+def _two(paths: list[Path], options: argparse.Namespace) -> int:
+    from surgsim.errors import SurgsimError
     from surgsim.recording import view
+    from surgsim.recording.pair import write_pair
+    from surgsim.recording.read import read_recording
 
+    if options.export:
+        raise SurgsimError("--export takes one recording")
+    pair = [read_recording(path) for path in paths]
+    _print_difference(pair, as_json=options.json)
+    if not (options.view or options.web or options.out):
+        return 0
+    file = options.out or Path("runs") / "pair.rrd"
+    file.parent.mkdir(parents=True, exist_ok=True)
+    write_pair(file, pair)
+    print(f"wrote {file}", file=sys.stderr)
     if options.view:
-        view.view(options.path)
+        view.view(file)
     elif options.web:
-        view.serve(options.path)
+        view.serve(file)
+    return 0
+
+
+def _print_difference(pair: "list[Recorded]", as_json: bool) -> None:
+    from surgsim.cli.output import format_number, print_table
+    from surgsim.metrics.catalog import METRICS, compute_metrics
+
+    a, b = (compute_metrics(recorded.trace) for recorded in pair)
+    names = [recorded.trace.meta.scenario["controller"]["name"] for recorded in pair]
+    gaps = {name: None if a[name] is None or b[name] is None else b[name] - a[name] for name in METRICS}  # type: ignore[operator]
+    if as_json:
+        print(json.dumps({"a": a, "b": b, "b_minus_a": gaps}, indent=2))
+        return
+    rows = [
+        (name, format_number(a[name]), format_number(b[name]), format_number(gaps[name])) for name in METRICS
+    ]
+    scenarios = {recorded.trace.meta.scenario["name"] for recorded in pair}
+    print_table(" and ".join(sorted(scenarios)), ("metric", *names, "difference"), rows, right=(1, 2, 3))
+    ticks = min(len(recorded.trace) for recorded in pair)
+    gap = pair[0].trace.block("tip")[:ticks] - pair[1].trace.block("tip")[:ticks]
+    print(f"\nlargest distance between the two tips: {1e3 * float((gap**2).sum(axis=1).max() ** 0.5):.4f} mm")
+
+
+def _list_batch(path: Path, options: argparse.Namespace) -> int:
+    from surgsim.cli.output import format_number, print_table
+    from surgsim.compare.table import read_table
+
+    rows = read_table(path).to_pylist()
+    if options.json:
+        print(json.dumps(rows, indent=2))
+        return 0
+    shown = ("tip_error_rms_mm", "rcm_error_rms_mm", "rcm_error_max_mm")
+    table = [(row["run_id"], row["outcome"], *(format_number(row[name]) for name in shown)) for row in rows]
+    print_table(f"{len(rows)} runs of {path}", ("run", "outcome", *shown), table, right=(2, 3, 4))
+    print("\nsurgsim inspect DIR --run RUN opens one")
+    return 0

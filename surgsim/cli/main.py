@@ -13,12 +13,13 @@ from collections.abc import Sequence
 from surgsim import __version__
 from surgsim.errors import SurgsimError
 
-COMMANDS = ("run", "check", "list", "inspect", "bench")
+COMMANDS = ("run", "check", "list", "compare", "report", "inspect", "reproduce", "bench")
 _EPILOG = """examples:
   surgsim run circle_lwr4plus                      run a shipped scenario, write its folder below runs/
   surgsim run my.yaml --set task.radius_m=0.03     run your own, with one value changed
   surgsim check my.yaml                            say what is wrong with it, or print it with every default
   surgsim list controllers                         what can be named in a scenario
+  surgsim compare quick                            a suite of scenarios, controllers and seeds
   surgsim inspect runs/circle_lwr4plus/vprnn-seed0 --view
 """
 

@@ -3,14 +3,19 @@
 import math
 import sys
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from typing import TYPE_CHECKING
 
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
 from surgsim.simulate.loop import Progress as ProgressCall
+
+if TYPE_CHECKING:
+    from surgsim.compare.intervals import Interval
+    from surgsim.compare.leaderboard import LeaderboardRow
 
 
 def format_number(value: float | None, digits: int = 4) -> str:
@@ -91,3 +96,73 @@ class _Lines:
             factor = reached_s / (now - self._began)
             text = f"{self._label}: {reached_s:.1f} of {duration_s:.1f} s, {factor:.1f}x real time"
             print(text, file=sys.stderr, flush=True)
+
+
+@contextmanager
+def show_batch_progress(label: str) -> Iterator[Callable[[int, int, str], None]]:
+    """Progress of a batch with the time that remains: a bar on a terminal, else lines; both on stderr."""
+    if sys.stderr.isatty():
+        yield from _batch_bar(label)
+    else:
+        yield _BatchLines(label)
+
+
+def _batch_bar(label: str) -> Iterator[Callable[[int, int, str], None]]:
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        TextColumn("{task.completed:.0f}/{task.total:.0f} runs  {task.fields[failed]}"),
+        TimeRemainingColumn(),
+    )
+    failed = 0
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task(label, total=None, failed="")
+
+        def update(done: int, total: int, outcome: str) -> None:
+            nonlocal failed
+            failed += outcome != "completed"
+            bar.update(task, completed=done, total=total, failed=f"{failed} failed" if failed else "")
+
+        yield update
+
+
+class _BatchLines:
+    """A plain line every five seconds, and at the end."""
+
+    def __init__(self, label: str) -> None:
+        self._label = label
+        self._began = self._last = time.perf_counter()
+        self._first = -1
+        self._failed = 0
+
+    def __call__(self, done: int, total: int, outcome: str) -> None:
+        now = time.perf_counter()
+        if self._first < 0:
+            self._first = done - 1
+        self._failed += outcome != "completed"
+        if now - self._last >= 5.0 or done == total:
+            self._last = now
+            left = (total - done) * (now - self._began) / max(done - self._first, 1)
+            text = f"{self._label}: {done} of {total} runs, {self._failed} failed, about {left:.0f} s to go"
+            print(text, file=sys.stderr, flush=True)
+
+
+def print_leaderboard(metric: str, rows: "Sequence[LeaderboardRow]") -> None:
+    """Print a leaderboard, failures beside every figure."""
+
+    def interval(figure: "Interval") -> str:
+        if figure.value is None:
+            return "-"
+        if figure.low is None or figure.high is None:
+            return format_number(figure.value)
+        return f"{format_number(figure.value)} [{format_number(figure.low)}, {format_number(figure.high)}]"
+
+    def failures(row: "LeaderboardRow") -> str:
+        return ", ".join(f"{count} {name}" for name, count in row.failures.items()) or "none"
+
+    table = [
+        (row.controller, str(row.runs), failures(row), interval(row.value), interval(row.rank))
+        for row in rows
+    ]
+    header = ("controller", "runs", "failed", f"{metric} (IQM, 95 %)", "mean rank (95 %)")
+    print_table(f"{metric}, best mean rank first", header, table, right=(1, 3, 4))

@@ -128,7 +128,7 @@ class Controller:
         resolution, self._resolver_memory = self._resolver.step(velocity, self._resolver_memory)
         q_ref, terms = self._q_ref, np.zeros((0, 7))
         if self._law is not None:
-            problem = self._torque_problem(state, command, measured, resolution)
+            problem = self._torque_problem(state, resolution.command or command, measured, resolution)
             if not self._started:
                 self._law_memory = self._law.start(problem)
             terms, self._law_memory = self._law.torque(problem, self._law_memory)

@@ -79,10 +79,12 @@ class Resolution:
     Attributes:
         qdot: Joint velocities inside the bounds (7,) [rad/s].
         residual: Norm of the task and RCM rows that `qdot` leaves unmet [m/s].
+        command: The tip motion that `qdot` follows, where that is not the task's, for the torque law.
     """
 
     qdot: Array
     residual: float
+    command: TipCommand | None = None
 
 
 def velocity_bounds(q: Array, limits: JointLimits, position_gain_per_s: float) -> tuple[Array, Array]:

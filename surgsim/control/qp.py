@@ -32,6 +32,8 @@ class DenseQp:
         self, H: Array, f: Array, lower: Array, upper: Array, G: Array, G_lower: Array, G_upper: Array
     ) -> Array | None:
         """The minimiser, or None if there is none within the back end's limits."""
+        if (lower > upper).any() or (G_lower > G_upper).any():
+            return None
         if self._backend == "daqp":
             return self._solve_daqp(H, f, lower, upper, G, G_lower, G_upper)
         return _solve_with(self._backend, H, f, lower, upper, G, G_lower, G_upper)

@@ -14,7 +14,7 @@ from surgsim.trace.trace import Trace
 
 Array = NDArray[np.float64]
 
-SAMPLES = 60
+SAMPLES = 20
 _STARTS = 12
 
 

@@ -97,7 +97,7 @@ def _add_arm(spec: mujoco.MjSpec, config: SceneConfig) -> None:
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET  # divergence must be seen
     spec.option.gravity = [0.0, 0.0, -GRAVITY_M_PER_S2]
-    arm = robot_spec(config.robot.name)
+    arm = robot_spec(config.robot.name, config.robot.dh_variant)
     attach_instrument(arm, config.instrument)
     graft(spec, arm, frame=_base_frame(spec, config.robot))
 

@@ -8,15 +8,27 @@ from surgsim.catalog import PartConfig
 
 Vec3 = tuple[FiniteFloat, FiniteFloat, FiniteFloat]
 Vec7 = tuple[FiniteFloat, FiniteFloat, FiniteFloat, FiniteFloat, FiniteFloat, FiniteFloat, FiniteFloat]
-RobotName = Literal["lwr4plus"]
+RobotName = Literal["lwr4plus", "panda"]
 
 
 class RobotConfig(PartConfig):
-    """Which arm, and where its base stands in the world."""
+    """Which arm, and where its base stands in the world.
+
+    Attributes:
+        dh_variant: `literal` takes d2 = 0.2 m of the LWR4+ as Table 3 of the manipulability paper prints it,
+            a misprint (the arm has 0): for studies of that paper alone.
+    """
 
     name: RobotName
     base_position_m: Vec3 = (0.0, 0.0, 0.0)
     base_yaw_rad: FiniteFloat = 0.0
+    dh_variant: Literal["standard", "literal"] = "standard"
+
+    @model_validator(mode="after")
+    def _variant_exists(self) -> Self:
+        if self.dh_variant == "literal" and self.name != "lwr4plus":
+            raise ValueError(f"dh_variant 'literal' is of 'lwr4plus' alone, not of '{self.name}'")
+        return self
 
 
 class InstrumentConfig(PartConfig):

@@ -2,8 +2,9 @@
 
 A robot is a folder `assets/<name>/` with `<name>.xml`, an MJCF that holds nothing but the arm: bodies
 `base`, `link1`..`link7`, joints `joint1`..`joint7`, torque motors `motor1`..`motor7` whose ctrlrange is
-the torque limit, a site `flange` whose z is the tool axis, and the numerics `velocity_limit_rad_per_s`
-and `acceleration_limit_rad_per_s2`, which MJCF has no attribute for.
+the torque limit, a site `flange` whose z is the tool axis, and the numerics that MJCF has no attribute
+for: `velocity_limit_rad_per_s`, `acceleration_limit_rad_per_s2`, and where they are published
+`jerk_limit_rad_per_s3` and `torque_rate_limit_nm_per_s`.
 """
 
 from dataclasses import dataclass
@@ -20,6 +21,8 @@ from surgsim.spatial import Array
 
 JOINTS = tuple(f"joint{i}" for i in range(1, 8))
 MOTORS = tuple(f"motor{i}" for i in range(1, 8))
+LITERAL_D2_M = 0.2
+"""d2 of the LWR4+ as printed in Table 3 of the manipulability paper."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -32,6 +35,8 @@ class JointLimits:
         velocity: Largest speed either way [rad/s].
         acceleration: Largest acceleration either way [rad/s²].
         torque: Largest motor torque either way [N m].
+        jerk: Largest jerk either way [rad/s³]; infinite where none is published.
+        torque_rate: Fastest change of torque either way [N m/s]; infinite where none is published.
     """
 
     q_min: Array
@@ -39,6 +44,8 @@ class JointLimits:
     velocity: Array
     acceleration: Array
     torque: Array
+    jerk: Array
+    torque_rate: Array
 
     @classmethod
     def of(cls, model: mujoco.MjModel) -> Self:
@@ -51,6 +58,8 @@ class JointLimits:
             velocity=_frozen(model.numeric("velocity_limit_rad_per_s").data),
             acceleration=_frozen(model.numeric("acceleration_limit_rad_per_s2").data),
             torque=_frozen(torques[:, 1]),
+            jerk=_optional(model, "jerk_limit_rad_per_s3"),
+            torque_rate=_optional(model, "torque_rate_limit_nm_per_s"),
         )
 
 
@@ -60,15 +69,26 @@ def robot_names() -> list[str]:
     return sorted(folder.name for folder in folders if (folder / f"{folder.name}.xml").is_file())
 
 
-def robot_spec(name: str) -> mujoco.MjSpec:
-    """The arm alone, its base at the origin.
+def robot_spec(name: str, dh_variant: str = "standard") -> mujoco.MjSpec:
+    """The arm alone, its base at the origin; `literal` moves link 3 along the axis of joint 2 by d2 = 0.2 m.
 
     Raises:
         SurgsimError: If there is no such robot.
     """
     if name not in robot_names():
         raise SurgsimError(unknown_name(name, "robot", robot_names()))
-    return asset(f"{name}/{name}.xml")
+    spec = asset(f"{name}/{name}.xml")
+    if dh_variant == "literal":
+        axis = np.array(spec.joint("joint2").axis)
+        link = spec.body("link3")
+        link.pos = np.array(link.pos) + LITERAL_D2_M * axis
+    return spec
+
+
+def _optional(model: mujoco.MjModel, numeric: str) -> Array:
+    """The seven values of `numeric`, infinite in a model without it."""
+    known = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_NUMERIC, numeric) >= 0
+    return _frozen(model.numeric(numeric).data if known else np.full(7, np.inf))
 
 
 def _frozen(values: ArrayLike) -> Array:

@@ -15,29 +15,29 @@ _BACKGROUND = (52, 60, 66)
 
 def blueprint(scenario: Scenario, trace: Trace) -> rrb.Blueprint:
     """The layout that is stored in the file."""
-    left = rrb.Vertical(_scene_view(scenario, trace), _texts(), row_shares=[0.72, 0.28])
+    left = rrb.Vertical(scene_view(scenario, trace), _texts(), row_shares=[0.72, 0.28])
     middle = rrb.Vertical(
-        _plot("Tip and RCM error [mm]", ERRORS),
+        plot("Tip and RCM error [mm]", ERRORS),
         _tabs(
-            _plot("Manipulability", series_path("manipulability")),
-            _plot("6-D", series_path("manipulability_6d")),
+            plot("Manipulability", series_path("manipulability")),
+            plot("6-D", series_path("manipulability_6d")),
         ),
         _tabs(
             _control_time_plot(trace),
-            _plot("Resolver residual [m/s]", series_path("resolver_residual")),
-            _plot("Saturated joints", series_path("saturated_joints")),
+            plot("Resolver residual [m/s]", series_path("resolver_residual")),
+            plot("Saturated joints", series_path("saturated_joints")),
         ),
     )
     right = rrb.Vertical(
         _tabs(
-            _plot("Joint position [rad], limits grey", series_path("q"), f"{LIMITS}/q"),
-            _plot("Reference", series_path("q_ref"), f"{LIMITS}/q"),
+            plot("Joint position [rad], limits grey", series_path("q"), f"{LIMITS}/q"),
+            plot("Reference", series_path("q_ref"), f"{LIMITS}/q"),
         ),
         _tabs(
-            _plot("Joint velocity [rad/s], limits grey", series_path("v"), f"{LIMITS}/v"),
-            _plot("Command", series_path("qdot_ref"), f"{LIMITS}/v"),
+            plot("Joint velocity [rad/s], limits grey", series_path("v"), f"{LIMITS}/v"),
+            plot("Command", series_path("qdot_ref"), f"{LIMITS}/v"),
         ),
-        _tabs(_plot("Torque [N m], limits grey", series_path("tau"), f"{LIMITS}/tau"), *_terms(trace)),
+        _tabs(plot("Torque [N m], limits grey", series_path("tau"), f"{LIMITS}/tau"), *_terms(trace)),
     )
     return rrb.Blueprint(
         rrb.Horizontal(left, middle, right, column_shares=[0.46, 0.26, 0.28]),
@@ -48,7 +48,10 @@ def blueprint(scenario: Scenario, trace: Trace) -> rrb.Blueprint:
     )
 
 
-def _scene_view(scenario: Scenario, trace: Trace) -> rrb.Spatial3DView:
+def scene_view(
+    scenario: Scenario, trace: Trace, *, below: str = "", name: str | None = None
+) -> rrb.Spatial3DView:
+    """The 3-D view of the scene below entity `below`, its eye on arm and port."""
     focus = _focus(scenario, trace)
     base = np.array(scenario.robot.base_position_m)
     away = (focus - base)[:2]
@@ -59,8 +62,8 @@ def _scene_view(scenario: Scenario, trace: Trace) -> rrb.Spatial3DView:
     eye[2] = _EYE_M[2]
     target = focus + 0.25 * (base - focus) + np.array([0.0, 0.0, 0.15])
     return rrb.Spatial3DView(
-        name=f"Tip path: desired blue, actual red. RCM error x{RCM_ARROW_SCALE:g}: yellow arrow",
-        origin=f"/{SCENE}",
+        name=name or f"Tip path: desired blue, actual red. RCM error x{RCM_ARROW_SCALE:g}: yellow arrow",
+        origin=f"/{below}{SCENE}",
         background=_BACKGROUND,
         line_grid=not scenario.theatre,
         eye_controls=rrb.EyeControls3D(
@@ -90,7 +93,7 @@ def _tabs(*views: rrb.View) -> rrb.Tabs:
 def _terms(trace: Trace) -> list[rrb.TimeSeriesView]:
     """A plot for every term of the torque law."""
     terms = trace.blocks[len(BASE_BLOCKS) :]
-    return [_plot(block.name.strip("_").removeprefix("tau_"), series_path(block.name)) for block in terms]
+    return [plot(block.name.strip("_").removeprefix("tau_"), series_path(block.name)) for block in terms]
 
 
 def _control_time_plot(trace: Trace) -> rrb.TimeSeriesView:
@@ -99,12 +102,13 @@ def _control_time_plot(trace: Trace) -> rrb.TimeSeriesView:
     usual = float(np.quantile(times[np.isfinite(times)], 0.99)) if np.isfinite(times).any() else 0.0
     top = 1.2 * max(trace.meta.control_period_s, usual)
     axis = rrb.ScalarAxis(range=(0.0, top))
-    return _plot(
+    return plot(
         "Control time [s], deadline grey", series_path("control_time"), f"{LIMITS}/control_time", axis_y=axis
     )
 
 
-def _plot(name: str, *paths: str, axis_y: rrb.ScalarAxis | None = None) -> rrb.TimeSeriesView:
+def plot(name: str, *paths: str, axis_y: rrb.ScalarAxis | None = None) -> rrb.TimeSeriesView:
+    """A plot of the series at `paths`."""
     return rrb.TimeSeriesView(
         name=name,
         origin="/",

@@ -26,7 +26,7 @@ def scenario_of(trace: Trace) -> Scenario:
 
 def rebuild(scenario: Scenario) -> Scene:
     """The scene that was simulated, disturbances included."""
-    return build(scenario.scene, [config.build() for config in scenario.disturbances])
+    return build(scenario.scene, scenario.build_disturbances())
 
 
 def log_scene(stream: rr.RecordingStream, scenario: Scenario, trace: Trace) -> None:

@@ -31,13 +31,11 @@ class RunResult:
         trace: Its trace.
         metrics: Its metrics; None where a metric is not defined.
         wall_time_s: Wall time of the simulation alone [s].
-        folder: Where it was written.
     """
 
     trace: Trace
     metrics: Mapping[str, float | None]
     wall_time_s: float
-    folder: Path
 
     @property
     def real_time_factor(self) -> float:
@@ -54,19 +52,43 @@ def run_to_folder(
         SurgsimError: If the scenario cannot be started, or the folder cannot be written.
     """
     check_target(folder)
+    result = execute(scenario, progress)
+    write_run(scenario, result, folder, record=record)
+    return result
+
+
+def execute(scenario: Scenario, progress: Progress | None = None) -> RunResult:
+    """Run `scenario` and compute its metrics; write nothing.
+
+    Raises:
+        SurgsimError: If the scenario cannot be started.
+    """
     began = perf_counter()
     trace = simulate(scenario, progress)
     wall = perf_counter() - began
-    metrics = compute_metrics(trace)
+    return RunResult(trace=trace, metrics=compute_metrics(trace), wall_time_s=wall)
+
+
+def write_run(scenario: Scenario, result: RunResult, folder: Path, *, record: bool) -> None:
+    """Write a run's folder.
+
+    Raises:
+        SurgsimError: If the folder cannot be written.
+    """
     with whole_folder(folder) as draft:
-        (draft / "scenario.yaml").write_text(dump_yaml(scenario.resolved()))
-        summary = _summary(scenario, trace, metrics, wall)
-        (draft / "metrics.json").write_text(json.dumps(summary, indent=2) + "\n")
+        outcome = result.trace.meta.ending.to_dict()
+        summary = summary_of(scenario, outcome, result.metrics, result.wall_time_s)
+        write_summary(draft, scenario, summary)
         if record:
             from surgsim.recording.write import write_recording  # rerun takes a second to import
 
-            write_recording(draft / "recording.rrd", trace, metrics)
-    return RunResult(trace=trace, metrics=metrics, wall_time_s=wall, folder=folder)
+            write_recording(draft / "recording.rrd", result.trace, result.metrics)
+
+
+def write_summary(draft: Path, scenario: Scenario, summary: Mapping[str, Any]) -> None:
+    """Write `scenario.yaml` and `metrics.json` into a folder that is being made."""
+    (draft / "scenario.yaml").write_text(dump_yaml(scenario.resolved()))
+    (draft / "metrics.json").write_text(json.dumps(summary, indent=2) + "\n")
 
 
 def check_target(folder: Path) -> None:
@@ -109,15 +131,16 @@ def whole_folder(folder: Path) -> Iterator[Path]:
             shutil.rmtree(draft, ignore_errors=True)
 
 
-def _summary(
-    scenario: Scenario, trace: Trace, metrics: Mapping[str, float | None], wall_s: float
+def summary_of(
+    scenario: Scenario, outcome: Mapping[str, Any], metrics: Mapping[str, float | None], wall_s: float
 ) -> dict[str, Any]:
+    """The content of `metrics.json`."""
     return {
         "schema_version": SCHEMA_VERSION,
         "scenario": scenario.name,
         "controller": scenario.controller.name,
         "seed": scenario.seed,
-        "outcome": trace.meta.ending.to_dict(),
+        "outcome": dict(outcome),
         "metrics": dict(metrics),
         "provenance": {**provenance(), "scenario_sha256": scenario.sha256(), "wall_time_s": round(wall_s, 6)},
     }

@@ -2,6 +2,7 @@
 
 import platform
 import subprocess
+from functools import lru_cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
@@ -11,8 +12,12 @@ import surgsim
 _PACKAGES = ("mujoco", "numpy", "scipy", "mink", "daqp", "qpsolvers", "osqp", "rerun-sdk")
 
 
+@lru_cache(maxsize=1)
 def provenance() -> dict[str, Any]:
-    """Versions of surgsim, Python and the numerical packages, the machine, and the checkout's commit."""
+    """Versions of surgsim, Python and the numerical packages, the machine, and the checkout's commit.
+
+    Found once a process: git takes longer than a short run.
+    """
     return {
         "surgsim": surgsim.__version__,
         "python": platform.python_version(),

@@ -5,6 +5,7 @@ import json
 import re
 from typing import Annotated, Any, Literal, Self
 
+import numpy as np
 from pydantic import AfterValidator, Field, NonNegativeInt, PositiveFloat, model_validator
 
 from surgsim.catalog import PartConfig
@@ -12,6 +13,7 @@ from surgsim.control.controller import ControllerConfig
 from surgsim.models.config import InstrumentConfig, RobotConfig, SceneConfig, TrocarConfig, Vec7
 from surgsim.plant import PLANTS
 from surgsim.plant.disturbances import DISTURBANCES
+from surgsim.plant.disturbances.base import Disturbance
 from surgsim.plant.dynamic import DynamicPlantConfig
 from surgsim.tasks import TASKS
 
@@ -121,6 +123,8 @@ class Scenario(PartConfig):
             raise ValueError("give task.start_m, or start.q_rad where the path then begins")
         if self.plant.uses_torque and self.controller.torque_law is None:
             raise ValueError(f"plant '{self.plant.type}' needs controller.torque_law")
+        for disturbance in self.disturbances:
+            disturbance.check(self.simulation.control_period_s)
         if self.disturbances and not self.plant.uses_torque:
             raise ValueError(f"disturbances do not act on the '{self.plant.type}' plant: leave them out")
         return self
@@ -135,6 +139,16 @@ class Scenario(PartConfig):
             theatre=self.theatre,
             timestep_s=self.simulation.timestep_s,
         )
+
+    def build_disturbances(self) -> list[Disturbance]:
+        """The disturbances, each with values drawn from its own child of the seed."""
+        children = np.random.SeedSequence(self.seed, spawn_key=(0,)).spawn(len(self.disturbances))
+        pairs = zip(self.disturbances, children, strict=True)
+        return [config.build(np.random.default_rng(child)) for config, child in pairs]
+
+    def run_seed(self) -> np.random.SeedSequence:
+        """Where the randomness during a run comes from."""
+        return np.random.SeedSequence(self.seed, spawn_key=(1,))
 
     def resolved(self) -> dict[str, Any]:
         """Every key with its value, as plain data that loads to the same scenario."""

@@ -67,6 +67,24 @@ class Simulation:
         """Whether the run has ended."""
         return self._ending is not None
 
+    @property
+    def ending(self) -> Ending | None:
+        """How the run ended; None while it goes on."""
+        return self._ending
+
+    @property
+    def state(self) -> State:
+        """The plant's state at the present tick."""
+        return self._state
+
+    @property
+    def due(self) -> bool:
+        """Whether the next tick ends the run whatever the controller does: time is up, or a limit passed."""
+        if self._count >= self._ticks:
+            return True
+        command, truth = self._setup.task.command(self._state.t_s), self._setup.plant.truth()
+        return self._safety.check(self._state, truth, command) is not None
+
     def run(self, progress: Progress | None = None) -> Trace:
         """Tick to the end."""
         duration = self._setup.task.duration_s

@@ -1,6 +1,7 @@
 """Everything that a scenario needs, built and checked before the first tick."""
 
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import mujoco
@@ -48,15 +49,16 @@ def prepare(scenario: Scenario) -> Setup:
         UnreachableError: If start or path cannot be reached through the trocar.
         SurgsimError: If the model does not compile.
     """
-    disturbances = [config.build() for config in scenario.disturbances]
+    disturbances = scenario.build_disturbances()
     arm = ArmModel(scenario.scene)
-    task, q_start = start_of(scenario, arm)
+    q_start = _start_of(_start_key(scenario))
+    task = scenario.task.build(_path_start(scenario, arm))
     try:
         scene = build(scenario.scene, disturbances, drawn=False)
     except ValueError as error:
         raise SurgsimError(f"{scenario.name}: MuJoCo refuses the model: {error}") from error
     period = scenario.simulation.control_period_s
-    plant = scenario.plant.build(scene, period, disturbances, np.random.SeedSequence(scenario.seed))
+    plant = scenario.plant.build(scene, period, disturbances, scenario.run_seed())
     controller = Controller(
         scenario.controller,
         arm,
@@ -75,16 +77,26 @@ def prepare(scenario: Scenario) -> Setup:
     )
 
 
-def start_of(scenario: Scenario, arm: ArmModel) -> tuple[Task, Array]:
-    """The task with its path placed in the world, and the start configuration (7,) [rad]."""
+def _path_start(scenario: Scenario, arm: ArmModel) -> Array:
+    """Where the path begins (3,) [m]."""
+    if scenario.task.start_m is not None:
+        return np.array(scenario.task.start_m)
+    return arm.kinematics(np.array(scenario.start.q_rad)).p_WT
+
+
+def _start_key(scenario: Scenario) -> str:
+    """The scenario reduced to what start and reach depend on: not the seed, nor what disturbs the plant."""
+    return scenario.model_copy(update={"seed": 0, "disturbances": ()}).model_dump_json()
+
+
+@lru_cache(maxsize=256)
+def _start_of(scenario_json: str) -> Array:
+    """Start configuration (7,) [rad], with the path checked; found once for the runs of a batch."""
+    scenario = Scenario.model_validate_json(scenario_json)
+    arm = ArmModel(scenario.scene)
     p_WC = None if scenario.trocar is None else np.array(scenario.trocar.position_m)
     reach = Reach(arm, p_WC)
-    given = scenario.start.q_rad
-    if scenario.task.start_m is not None:
-        p_start = np.array(scenario.task.start_m)
-    else:
-        p_start = arm.kinematics(np.array(given)).p_WT
-    task = scenario.task.build(p_start)
+    given, p_start = scenario.start.q_rad, _path_start(scenario, arm)
     try:
         if scenario.trocar is not None:
             check_through_port(p_start, "the start at", scenario.instrument, scenario.trocar)
@@ -93,10 +105,11 @@ def start_of(scenario: Scenario, arm: ArmModel) -> tuple[Task, Array]:
         else:
             q = _checked_start(reach, arm, np.array(given), p_start)
         if scenario.trocar is not None:
-            check_path(reach, task, q, scenario.instrument, scenario.trocar)
+            check_path(reach, scenario.task.build(p_start), q, scenario.instrument, scenario.trocar)
     except UnreachableError as error:
         raise UnreachableError(f"{scenario.name}: {error}") from error
-    return task, q
+    q.flags.writeable = False
+    return q
 
 
 def _posture(scenario: Scenario, arm: ArmModel) -> Array:

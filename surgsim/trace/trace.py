@@ -100,7 +100,7 @@ class Ending:
             "sentence": self.outcome.value,
             "t_s": self.t_s,
             "detail": self.detail,
-            "data": {name: np.asarray(value).tolist() for name, value in self.data.items()},
+            "data": {name: _plain(value) for name, value in self.data.items()},
         }
 
     @staticmethod
@@ -112,6 +112,14 @@ class Ending:
             detail=str(plain["detail"]),
             data={name: np.array(value, dtype=float) for name, value in plain["data"].items()},
         )
+
+
+def _plain(values: Array) -> list[Any]:
+    """Nested lists with None for what JSON cannot hold."""
+    nested = np.asarray(values, dtype=object)
+    nested[~np.isfinite(np.asarray(values, dtype=float))] = None
+    plain: list[Any] = nested.tolist()
+    return plain
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -224,17 +224,17 @@ def _fall(plant, q, steps=60):
 def test_disturbance_is_deterministic_under_a_seed_and_starts_afresh(random_q, name):
     q = random_q(np.random.default_rng(0))
     config = DISTURBANCES.config(name)()
-    plant = _plant(config.build())
+    plant = _plant(config.build(np.random.default_rng(0)))
     first = _fall(plant, q)
     assert np.isfinite(first).all()
     np.testing.assert_array_equal(_fall(plant, q), first)
-    np.testing.assert_array_equal(_fall(_plant(config.build()), q), first)
+    np.testing.assert_array_equal(_fall(_plant(config.build(np.random.default_rng(0))), q), first)
     np.testing.assert_array_equal(first[0, :7], q)
 
 
 @every_disturbance
 def test_disturbance_leaves_the_controller_s_model_alone(arm, name):
-    disturbance = DISTURBANCES.config(name)().build()
+    disturbance = DISTURBANCES.config(name)().build(np.random.default_rng(0))
     scene = build(SCENE, [disturbance])
     assert (scene.model.nv, scene.model.nu) == (7, 7)
     assert mujoco.mj_name2id(arm.scene.model, mujoco.mjtObj.mjOBJ_BODY, name) < 0

@@ -14,6 +14,8 @@ from surgsim.models.robot import robot_names
 ROBOT = RobotConfig(name="lwr4plus")
 TROCAR = TrocarConfig(position_m=(0.1, 0.5, 0.25), axis=(0.0, -0.3, 1.0))
 Q = np.radians((-35, 10, -55, -95, 5, 60, 20))
+MASS_KG = {"lwr4plus": 16.0, "panda": 16.691901}
+WRIST_TO_FLANGE_M = {"lwr4plus": 0.078, "panda": 0.107}
 
 
 def _config(**changes: object) -> SceneConfig:
@@ -31,9 +33,14 @@ def _z(data: mujoco.MjData, site: int) -> np.ndarray:
     return data.site_xmat[site].reshape(3, 3)[:, 2]
 
 
+@pytest.fixture(scope="module", params=robot_names())
+def robot(request) -> RobotConfig:
+    return RobotConfig(name=request.param)
+
+
 @pytest.fixture(scope="module", params=[False, True], ids=["bare", "theatre"])
-def scene(request) -> Scene:
-    return build(_config(theatre=request.param))
+def scene(robot, request) -> Scene:
+    return build(_config(robot=robot, theatre=request.param))
 
 
 def test_names_are_plain_and_ids_point_at_them(scene):
@@ -55,10 +62,10 @@ def test_options(scene):
     assert build(_config(timestep_s=0.0005)).model.opt.timestep == 0.0005
 
 
-def test_nothing_touches_and_only_the_arm_has_mass(scene):
+def test_nothing_touches_and_only_the_arm_has_mass(robot, scene):
     assert not scene.model.geom_contype.any()
     assert not scene.model.geom_conaffinity.any()
-    assert scene.model.body_mass.sum() == pytest.approx(16.0 + 0.35, abs=1e-9)
+    assert scene.model.body_mass.sum() == pytest.approx(MASS_KG[robot.name] + 0.35, abs=1e-9)
     assert scene.model.nv == scene.model.nu == 7
 
 
@@ -86,8 +93,8 @@ def test_trocar_follows_the_mocap_body(scene):
     np.testing.assert_allclose(data.site_xpos[scene.trocar_site], moved, atol=1e-12)
 
 
-def test_simulated_arm_and_nominal_arm_are_the_same(scene):
-    nominal = build_arm(_config())
+def test_simulated_arm_and_nominal_arm_are_the_same(robot, scene):
+    nominal = build_arm(_config(robot=robot))
     a, b = _at(scene), _at(nominal)
     np.testing.assert_allclose(a.qfrc_bias[scene.dof_ids], b.qfrc_bias[nominal.dof_ids], atol=1e-12)
     np.testing.assert_allclose(a.site_xpos[scene.tip_site], b.site_xpos[nominal.tip_site], atol=1e-12)
@@ -100,7 +107,8 @@ def test_simulated_arm_and_nominal_arm_are_the_same(scene):
 def test_arrays_handed_out_are_read_only(scene):
     limits = scene.limits
     arrays = [scene.qpos_ids, scene.dof_ids, scene.actuator_ids, limits.q_min, limits.q_max]
-    for array in [*arrays, limits.velocity, limits.acceleration, limits.torque]:
+    arrays += [limits.velocity, limits.acceleration, limits.torque, limits.jerk, limits.torque_rate]
+    for array in arrays:
         assert array.shape == (7,)
         with pytest.raises(ValueError, match="read-only"):
             array[0] = 0
@@ -137,14 +145,14 @@ def test_the_saved_model_loads_again(theatre):
     assert again.actuator("motor3").trnid[0] == again.joint("joint3").id
 
 
-def test_without_an_instrument_the_tip_is_the_flange_and_the_shaft_starts_at_the_wrist():
-    scene = build(_config(instrument=None))
+def test_without_an_instrument_the_tip_is_the_flange_and_the_shaft_starts_at_the_wrist(robot):
+    scene = build(_config(robot=robot, instrument=None))
     data = _at(scene)
     flange = data.site_xpos[scene.flange_site]
     np.testing.assert_allclose(data.site_xpos[scene.tip_site], flange, atol=1e-12)
-    wrist = flange - 0.078 * _z(data, scene.flange_site)
+    wrist = flange - WRIST_TO_FLANGE_M[robot.name] * _z(data, scene.flange_site)
     np.testing.assert_allclose(data.site_xpos[scene.shaft_entry_site], wrist, atol=1e-12)
-    assert scene.model.body_mass.sum() == pytest.approx(16.0, abs=1e-9)
+    assert scene.model.body_mass.sum() == pytest.approx(MASS_KG[robot.name], abs=1e-9)
 
 
 @pytest.mark.parametrize(("shaft", "adapter"), [(0.15, 0.01), (0.3, 0.06), (0.6, 0.2)])
@@ -198,7 +206,7 @@ def test_an_unknown_robot_is_refused():
 
 
 def test_robot_names():
-    assert "lwr4plus" in robot_names()
+    assert robot_names() == ["lwr4plus", "panda"]
     assert not {"instruments", "trocar", "theatre"} & set(robot_names())
 
 

@@ -128,10 +128,6 @@ def test_limits(arm):
     np.testing.assert_allclose(np.degrees(limits.velocity), [110, 110, 128, 128, 204, 184, 184])
     np.testing.assert_allclose(limits.acceleration, 5.236, atol=1e-3)
     np.testing.assert_allclose(limits.torque, [176, 176, 100, 100, 100, 38, 38])
-    np.testing.assert_allclose(arm.model.actuator_ctrlrange[:, 0], -limits.torque)
-    np.testing.assert_array_equal(arm.model.actuator_gear[:, 0], 1)
-    assert arm.model.jnt_limited.all()
-    assert arm.model.actuator_ctrllimited.all()
 
 
 def test_assumed_drive_constants(arm):
@@ -142,13 +138,3 @@ def test_assumed_drive_constants(arm):
 
 def test_total_mass(arm):
     assert arm.model.body_mass.sum() == pytest.approx(16.0, abs=1e-9)
-
-
-@pytest.mark.parametrize("body", ["base", *(f"link{i}" for i in range(1, 8))])
-def test_every_link_is_physically_consistent(arm, body):
-    index = arm.model.body(body).id
-    moments = arm.model.body_inertia[index]
-    # The pseudo-inertia is positive definite exactly when the mass is positive and so is each half sum
-    # of two principal moments less the third.
-    assert arm.model.body_mass[index] > 0
-    assert (moments.sum() / 2 - moments > 0).all()

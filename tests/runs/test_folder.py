@@ -23,14 +23,19 @@ def _names(folder):
 
 
 @pytest.fixture(scope="module")
-def result(scenario, tmp_path_factory):
-    return run_to_folder(scenario(seed=7), tmp_path_factory.mktemp("runs") / "deep" / "run", record=False)
+def folder(tmp_path_factory):
+    return tmp_path_factory.mktemp("runs") / "deep" / "run"
 
 
-def test_the_folder_holds_the_run(result, scenario):
-    assert _names(result.folder) == FILES - {"recording.rrd"}
-    assert _names(result.folder.parent) == {"run"}
-    summary = json.loads((result.folder / "metrics.json").read_text())
+@pytest.fixture(scope="module")
+def result(scenario, folder):
+    return run_to_folder(scenario(seed=7), folder, record=False)
+
+
+def test_the_folder_holds_the_run(result, folder, scenario):
+    assert _names(folder) == FILES - {"recording.rrd"}
+    assert _names(folder.parent) == {"run"}
+    summary = json.loads((folder / "metrics.json").read_text())
     assert summary["schema_version"] == 1
     assert (summary["scenario"], summary["controller"], summary["seed"]) == ("circle_lwr4plus", "vprnn", 7)
     assert summary["outcome"]["name"] == "completed"
@@ -40,8 +45,8 @@ def test_the_folder_holds_the_run(result, scenario):
     assert summary["provenance"]["packages"]["mujoco"]
 
 
-def test_its_scenario_run_again_gives_the_same_trace(result):
-    again = load_scenario(str(result.folder / "scenario.yaml"))
+def test_its_scenario_run_again_gives_the_same_trace(result, folder):
+    again = load_scenario(str(folder / "scenario.yaml"))
     assert again.seed == 7
     assert simulate(again).equals(result.trace)
 

@@ -9,6 +9,7 @@ RESOLVERS = Catalog(
         "gradient": "surgsim.control.resolvers.gradient:GradientConfig",
         "mink": "surgsim.control.resolvers.mink:MinkConfig",
         "pinv": "surgsim.control.resolvers.pinv:PinvConfig",
+        "policy": "surgsim.control.resolvers.policy:PolicyConfig",
         "qp": "surgsim.control.resolvers.qp:QpConfig",
         "rnn": "surgsim.control.resolvers.rnn:RnnConfig",
         "self_motion": "surgsim.control.resolvers.self_motion:SelfMotionConfig",

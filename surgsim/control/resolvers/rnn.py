@@ -160,6 +160,7 @@ def _flow(
     DT = np.ascontiguousarray(D.T)
     JT = np.ascontiguousarray(J.T)
     for _ in range(substeps):
+        mean += omega
         gap = J @ omega - v
         B_phi = (phi.reshape(3, 3) @ A).ravel()
         B_gap = ((B_phi - vec_I).reshape(3, 3) @ A).ravel()
@@ -171,5 +172,4 @@ def _flow(
         phi = phi + h * d_phi
         lam = lam + h * gap
         sigma = sigma + h * (vec_I - B_phi)
-        mean += omega
     return mean / substeps, omega, phi, lam, sigma

@@ -8,6 +8,7 @@ TORQUE_LAWS = Catalog(
     {
         "hierarchical_impedance": f"{__name__}.hierarchical_impedance:HierarchicalImpedanceConfig",
         "joint_impedance": f"{__name__}.joint_impedance:JointImpedanceConfig",
+        "policy": f"{__name__}.policy:PolicyLawConfig",
         "rcm_inverse_dynamics": f"{__name__}.rcm_inverse_dynamics:RcmInverseDynamicsConfig",
     },
 )

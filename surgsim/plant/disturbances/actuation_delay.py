@@ -7,15 +7,13 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from surgsim.catalog import PartConfig
-from surgsim.errors import SurgsimError
 from surgsim.models.build import Scene
-from surgsim.plant.disturbances.base import Disturbance
+from surgsim.plant.disturbances.base import Disturbance, DisturbanceConfig
 
 Array = NDArray[np.float64]
 
 
-class ActuationDelayConfig(PartConfig):
+class ActuationDelayConfig(DisturbanceConfig):
     """A constant delay between the torque command and the torque.
 
     Attributes:
@@ -25,7 +23,16 @@ class ActuationDelayConfig(PartConfig):
     type: Literal["actuation_delay"] = "actuation_delay"
     delay_s: Annotated[float, Field(gt=0.0, le=0.5)] = 0.005
 
-    def build(self) -> "ActuationDelay":
+    def check(self, control_period_s: float) -> None:
+        """Refuse a delay that is no whole multiple of the control period."""
+        ratio = self.delay_s / control_period_s
+        if abs(ratio - round(ratio)) > 1e-6 or round(ratio) < 1:
+            raise ValueError(
+                f"actuation_delay: delay_s {self.delay_s:g} must be a whole multiple of control_period_s "
+                f"{control_period_s:g}"
+            )
+
+    def build(self, rng: np.random.Generator) -> "ActuationDelay":
         """The disturbance."""
         return ActuationDelay(self)
 
@@ -39,18 +46,8 @@ class ActuationDelay(Disturbance):
         self._ticks = 0
 
     def start(self, scene: Scene, rng: np.random.Generator, dt_s: float) -> None:
-        """Forget all commands.
-
-        Raises:
-            SurgsimError: If the delay is not a whole multiple of the control period.
-        """
-        ratio = self._c.delay_s / dt_s
-        if abs(ratio - round(ratio)) > 1e-6 or round(ratio) < 1:
-            raise SurgsimError(
-                f"actuation_delay: delay_s {self._c.delay_s:g} must be a whole multiple of the control "
-                f"period {dt_s:g}"
-            )
-        self._ticks = round(ratio)
+        """Forget all commands."""
+        self._ticks = round(self._c.delay_s / dt_s)
         self._queue.clear()
 
     def delay(self, torque: Array) -> Array:

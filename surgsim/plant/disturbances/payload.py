@@ -6,37 +6,41 @@ import mujoco
 import numpy as np
 from pydantic import Field
 
-from surgsim.catalog import PartConfig
-from surgsim.plant.disturbances.base import Disturbance
+from surgsim.plant.disturbances.base import Disturbance, DisturbanceConfig, Spread, spread_factor
 
 
-class PayloadConfig(PartConfig):
+class PayloadConfig(DisturbanceConfig):
     """A point-like mass fixed to the tip adapter that the controller does not know of.
 
     Attributes:
         mass_kg: Mass of the payload [kg].
         distance_m: Where it sits on the shaft axis, from the flange [m].
+        spread: Relative spread of the mass over seeds.
     """
 
     type: Literal["payload"] = "payload"
     mass_kg: Annotated[float, Field(gt=0.0, le=10.0)] = 0.2
     distance_m: Annotated[float, Field(ge=0.0, le=1.0)] = 0.04
+    spread: Spread = 0.0
 
-    def build(self) -> "Payload":
-        """The disturbance."""
-        return Payload(self)
+    def build(self, rng: np.random.Generator) -> "Payload":
+        """The disturbance, its mass drawn."""
+        return Payload(self, self.mass_kg * float(spread_factor(rng, self.spread)[0]))
 
 
 class Payload(Disturbance):
     """Adds a solid sphere of water's density as a body fixed to the flange."""
 
-    def __init__(self, config: PayloadConfig) -> None:
+    def __init__(self, config: PayloadConfig, mass_kg: float) -> None:
         self._c = config
+        self._mass = mass_kg
 
     def modify(self, spec: mujoco.MjSpec) -> None:
         """Add the payload's body at the flange."""
         flange = spec.site("flange")
-        m = self._c.mass_kg
+        m = self._mass
+        if m <= 0.0:
+            return
         radius = (3.0 * m / (4.0 * np.pi * 1000.0)) ** (1.0 / 3.0)
         inertia = 0.4 * m * radius**2
         body = flange.parent.add_body(
@@ -44,6 +48,7 @@ class Payload(Disturbance):
             pos=np.array(flange.pos) + np.array([0.0, 0.0, self._c.distance_m]),
             quat=flange.quat,
             mass=m,
+            ipos=[0.0, 0.0, 0.0],  # MuJoCo takes the body's own position for a missing one
             inertia=[inertia] * 3,
             explicitinertial=True,
         )

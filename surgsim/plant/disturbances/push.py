@@ -8,15 +8,15 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, NonNegativeFloat, PositiveFloat
 
-from surgsim.catalog import PartConfig
 from surgsim.models.build import Scene
 from surgsim.models.config import Vec3
-from surgsim.plant.disturbances.base import Disturbance
+from surgsim.plant.disturbances.base import Disturbance, DisturbanceConfig
+from surgsim.spatial import unit
 
 Array = NDArray[np.float64]
 
 
-class PushConfig(PartConfig):
+class PushConfig(DisturbanceConfig):
     """A constant force for a while, with smooth edges, on the tip or on a link's frame origin.
 
     Attributes:
@@ -25,6 +25,7 @@ class PushConfig(PartConfig):
         start_s: When it begins [s].
         duration_s: How long it lasts [s].
         rise_s: Time of each of its edges [s].
+        direction: `given` as in force_n, or `random`: the same size, a direction drawn from the sphere.
     """
 
     type: Literal["push"] = "push"
@@ -34,17 +35,22 @@ class PushConfig(PartConfig):
     duration_s: PositiveFloat = 3.0
     rise_s: Annotated[float, Field(gt=0.0, le=10.0)] = 0.05
 
-    def build(self) -> "Push":
-        """The disturbance."""
-        return Push(self)
+    direction: Literal["given", "random"] = "given"
+
+    def build(self, rng: np.random.Generator) -> "Push":
+        """The disturbance, its direction drawn."""
+        force = np.array(self.force_n)
+        if self.direction == "random":
+            force = float(np.linalg.norm(force)) * unit(rng.normal(size=3))
+        return Push(self, force)
 
 
 class Push(Disturbance):
     """Adds the force to `xfrc_applied` of the body that carries the point, with its moment."""
 
-    def __init__(self, config: PushConfig) -> None:
+    def __init__(self, config: PushConfig, force: Array) -> None:
         self._c = config
-        self._force = np.array(config.force_n)
+        self._force = force
 
     def push(self, t_s: float, scene: Scene, data: mujoco.MjData) -> None:
         """Add the force at `t_s` [s]."""

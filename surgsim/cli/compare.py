@@ -1,0 +1,141 @@
+"""`surgsim compare`."""
+
+import argparse
+import os
+import shlex
+import sys
+from contextlib import redirect_stdout
+from pathlib import Path
+
+HELP = "run a suite of scenarios and controllers, and compare them"
+EXAMPLES = """A suite is a YAML file of scenarios, controllers, a grid of parameters and seeds; scenarios can
+be given instead. Every finished run is written at once. After an interruption --resume runs what is
+missing.
+
+examples:
+  surgsim compare quick
+  surgsim compare circle_lwr4plus spiral_lwr4plus --controllers vprnn,rcm_inverse_dynamics --seeds 0:5
+  surgsim compare quick --out results/quick --jobs 2 --resume
+  surgsim compare full --out /shared/full --shard 3/8        one of eight array jobs; then --resume once
+"""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the command's arguments."""
+    parser.add_argument("names", nargs="+", metavar="SUITE|SCENARIO", help="one suite, or scenarios")
+    parser.add_argument("--controllers", metavar="A,B", help="controllers instead of the suite's")
+    parser.add_argument("--seeds", metavar="0:10", help="seeds instead of the suite's: 0:10, 3 or 1,4,9")
+    parser.add_argument("--jobs", type=int, metavar="N", help="worker processes; default: the cores")
+    parser.add_argument("--engine", choices=("local", "ray"), default="local", help="where runs are done")
+    parser.add_argument("--address", metavar="HOST:PORT", help="the ray cluster's address")
+    parser.add_argument("--out", type=Path, metavar="DIR", help="folder of the results")
+    parser.add_argument("--resume", action="store_true", help="keep what is whole, run what is missing")
+    parser.add_argument("--shard", metavar="I/N", default="1/1", help="only every Nth run, from the Ith")
+    parser.add_argument("--record", action="store_true", help="write a recording of every run")
+    parser.add_argument("--metric", default="rcm_error_rms_mm", help="metric of the leaderboard")
+    parser.add_argument("--json", action="store_true", help="print the leaderboard as JSON")
+
+
+def execute(options: argparse.Namespace) -> int:
+    """Run the suite; 0 when its table is whole, 1 while other shards are missing."""
+    from surgsim.cli.output import show_batch_progress
+    from surgsim.compare.engine import Batch, compare
+    from surgsim.report.write import write_report
+
+    _check(options)
+    suite, folder = _suite(options)
+    out = options.out or Path("runs") / "suites" / suite.name
+    batch = Batch(
+        suite=suite,
+        folder=folder,
+        out=out,
+        jobs=_jobs(options.jobs),
+        resume=options.resume,
+        shard=_shard(options.shard),
+        command="surgsim " + shlex.join(sys.argv[1:]),
+    )
+    try:
+        with redirect_stdout(sys.stderr), show_batch_progress(suite.name) as report:  # ray prints warnings
+            table = compare(batch, report, _runner(options))
+    except KeyboardInterrupt:
+        print(f"surgsim: interrupted; --resume --out {out} runs what is missing", file=sys.stderr)
+        return 130
+    if table is None:
+        print(f"{out}: other shards' runs are missing; --resume makes the table once they are there")
+        return 1
+    _print(table, options)
+    print(f"{table.num_rows} runs; wrote {out / 'runs.parquet'} and runs.csv", file=sys.stderr)
+    print(f"wrote {write_report(out)}", file=sys.stderr)
+    return 0
+
+
+def _check(options: argparse.Namespace) -> None:
+    """Refuse what would only be found wrong after the runs.
+
+    Raises:
+        SurgsimError: If there is such a thing.
+    """
+    from surgsim.compare.observations import metric_named
+    from surgsim.errors import SurgsimError
+
+    metric_named(options.metric)
+    if options.address and options.engine != "ray":
+        raise SurgsimError("--address is for --engine ray")
+
+
+def _suite(options: argparse.Namespace):  # type: ignore[no-untyped-def]
+    """The suite that the command line means, and the folder of its relative paths."""
+    from surgsim.compare.suite import ad_hoc_suite, is_suite, load_suite, with_changes
+    from surgsim.errors import SurgsimError
+
+    names, controllers = options.names, options.controllers.split(",") if options.controllers else None
+    if is_suite(names[0]):
+        if len(names) > 1:
+            raise SurgsimError("give one suite, or scenarios; not both")
+        suite, folder = load_suite(names[0])
+    else:
+        suite, folder = ad_hoc_suite(names, None), Path()
+    return with_changes(suite, controllers, options.seeds, options.record), folder
+
+
+def _jobs(jobs: int | None) -> int:
+    from surgsim.errors import SurgsimError
+
+    if jobs is None:
+        return len(os.sched_getaffinity(0))
+    if jobs < 1:
+        raise SurgsimError(f"--jobs: {jobs} is not allowed: must be 1 or more")
+    return jobs
+
+
+def _shard(text: str) -> tuple[int, int]:
+    from surgsim.errors import SurgsimError
+
+    i, slash, n = text.partition("/")
+    if not (slash and i.isdigit() and n.isdigit() and 1 <= int(i) <= int(n) <= 10_000):
+        raise SurgsimError(f"--shard: '{text}' is not I/N with 1 <= I <= N")
+    return int(i), int(n)
+
+
+def _runner(options: argparse.Namespace):  # type: ignore[no-untyped-def]
+    """What runs the jobs."""
+    if options.engine == "local":
+        from surgsim.compare.workers import run_jobs
+
+        return run_jobs
+    from surgsim.compare.ray_engine import ray_runner
+
+    return ray_runner(options.address)
+
+
+def _print(table: object, options: argparse.Namespace) -> None:
+    import json
+
+    from surgsim.cli.output import print_leaderboard
+    from surgsim.compare.leaderboard import leaderboard
+
+    rows = leaderboard(table, options.metric)
+    if options.json:
+        print(json.dumps(rows, indent=2, default=vars))
+    else:
+        print_leaderboard(options.metric, rows)

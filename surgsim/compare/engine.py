@@ -1,0 +1,181 @@
+"""Running a suite: what is whole is kept, what is missing is run, and the table is made at the end."""
+
+import hashlib
+import json
+import os
+import shutil
+import tempfile
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pyarrow as pa
+
+from surgsim.compare.job import Job
+from surgsim.compare.suite import RunSpec, SuiteConfig, check_runs, expand
+from surgsim.compare.table import Row, write_table
+from surgsim.compare.workers import Done, run_jobs
+from surgsim.errors import SurgsimError
+from surgsim.runs.provenance import provenance
+from surgsim.scenario.schema import Scenario
+
+Report = Callable[[int, int, str], None]
+"""Called with the runs that are done, all runs, and the last one's outcome."""
+Runner = Callable[[Sequence[Job], int], Iterator[Done]]
+Code = tuple[str, str | None]
+"""Version and commit of surgsim."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Batch:
+    """A suite on its way.
+
+    Attributes:
+        suite: The suite.
+        folder: What the suite's relative paths are relative to.
+        out: Folder of its results.
+        jobs: Worker processes.
+        resume: Whether results that are there are kept.
+        shard: This part of the runs, `(i, n)` with 1 <= i <= n.
+        command: The command line, for the record.
+    """
+
+    suite: SuiteConfig
+    folder: Path
+    out: Path
+    jobs: int = 1
+    resume: bool = False
+    shard: tuple[int, int] = (1, 1)
+    command: str = ""
+
+
+def compare(batch: Batch, report: Report | None = None, runner: Runner = run_jobs) -> pa.Table | None:
+    """Run what is missing of a suite, and write its table once every run is whole.
+
+    Returns:
+        The table, or None while other shards' runs are missing.
+
+    Raises:
+        SurgsimError: If the suite, a scenario or the results folder is not right, or the disk refuses.
+    """
+    specs = expand(batch.suite, batch.folder)
+    scenarios = check_runs(specs)
+    rows = [_row(batch.suite, spec, scenario) for spec, scenario in zip(specs, scenarios, strict=True)]
+    _check_names(rows)
+    _prepare(batch)
+    everything = list(zip(rows, scenarios, specs, strict=True))
+    i, n = batch.shard
+    code = _code(provenance())
+    missing = [
+        (row, scenario, spec)
+        for row, scenario, spec in everything[i - 1 :: n]
+        if not is_whole(batch.out / row.folder, scenario, spec.record, code)
+    ]
+    jobs = [
+        Job(scenario_json=scenario.model_dump_json(), folder=str(batch.out / row.folder), record=spec.record)
+        for row, scenario, spec in missing
+    ]
+    count = len(everything[i - 1 :: n])
+    for done, result in enumerate(runner(jobs, batch.jobs), start=count - len(jobs) + 1):
+        if report is not None:
+            report(done, count, result.outcome)
+    if any(not is_whole(batch.out / row.folder, scenario, spec.record) for row, scenario, spec in everything):
+        return None
+    return write_table(batch.out, rows)
+
+
+def is_whole(folder: Path, scenario: Scenario, record: bool, code: Code | None = None) -> bool:
+    """Whether `folder` holds the run of exactly this scenario, with its recording if one is wanted.
+
+    With `code`, the run must also have been made by it.
+    """
+    try:
+        summary = json.loads((folder / "metrics.json").read_text())
+        same = code is None or _code(summary["provenance"]) == code
+        same = same and summary["provenance"]["scenario_sha256"] == scenario.sha256()
+        recorded = not record or not summary["metrics"] or (folder / "recording.rrd").is_file()
+    except (OSError, ValueError, KeyError, TypeError):
+        return False
+    return bool(same and recorded)
+
+
+def _code(origin: Mapping[str, Any]) -> Code:
+    return (origin["surgsim"], origin["commit"])
+
+
+def _row(suite: SuiteConfig, spec: RunSpec, scenario: Scenario) -> Row:
+    parameters: dict[str, Any] = dict(spec.parameters)
+    point = "base"
+    if parameters:
+        text = json.dumps(parameters, sort_keys=True)
+        point = hashlib.sha256(text.encode()).hexdigest()[:10]
+    run_id = f"{scenario.name}/{scenario.controller.name}/{point}-seed{spec.seed}"
+    return Row(run_id=run_id, suite=suite.name, parameters=parameters, folder=f"runs/{run_id}")
+
+
+def _check_names(rows: Sequence[Row]) -> None:
+    seen: set[str] = set()
+    for row in rows:
+        if row.run_id in seen:
+            raise SurgsimError(
+                f"two runs of the suite are both '{row.run_id}': "
+                "give scenarios and controllers different names"
+            )
+        seen.add(row.run_id)
+
+
+def _prepare(batch: Batch) -> None:
+    """Make the results folder and write `suite.json`; clear away what killed runs left half done."""
+    out, file = batch.out, batch.out / "suite.json"
+    about = {
+        "schema_version": 1,
+        "name": batch.suite.name,
+        "description": batch.suite.description,
+        "scenarios": list(batch.suite.scenarios),
+        "controllers": list(batch.suite.controllers or ()),
+        "grid": {key: list(values) for key, values in batch.suite.grid.items()},
+        "seeds": batch.suite.seeds,
+        "settings": list(batch.suite.settings),
+    }
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+        if any(not path.name.startswith(_DRAFT) for path in out.iterdir()):
+            _check_old(batch, about)
+        if batch.shard[1] == 1:  # other shards may be writing now
+            _clear(out)
+        whole = {**about, "command": batch.command, "provenance": provenance()}
+        handle, draft = tempfile.mkstemp(prefix=_DRAFT, suffix=".part", dir=out)
+        with os.fdopen(handle, "w") as stream:
+            stream.write(json.dumps(whole, indent=2) + "\n")
+        os.chmod(draft, 0o644)
+        os.replace(draft, file)
+    except OSError as error:
+        raise SurgsimError(f"cannot write {out}: {error.strerror or error}") from error
+
+
+_DRAFT = ".suite.json."
+
+
+def _check_old(batch: Batch, about: Mapping[str, Any]) -> None:
+    """Refuse a results folder that this batch may not go on with."""
+    out = batch.out
+    if not (out / "suite.json").is_file():
+        raise SurgsimError(f"{out} holds files that are not batch results; choose another --out")
+    if not batch.resume and batch.shard == (1, 1):
+        raise SurgsimError(f"{out} holds results; give --resume to go on with them, or another --out")
+    try:
+        old = json.loads((out / "suite.json").read_text())
+        same = {key: old.get(key) for key in about} == about
+    except (ValueError, AttributeError) as error:
+        raise SurgsimError(f"{out / 'suite.json'} is damaged: {error}") from error
+    if not same:
+        raise SurgsimError(f"{out} holds the results of another suite, or of other settings")
+
+
+def _clear(out: Path) -> None:
+    """Remove what killed runs left half done."""
+    for left in [*out.glob("runs/*/*/.*.part"), *out.glob("runs/*/*/.*.old")]:
+        shutil.rmtree(left, ignore_errors=True)
+    for left in out.glob(f"{_DRAFT}*.part"):
+        left.unlink(missing_ok=True)

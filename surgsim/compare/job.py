@@ -1,0 +1,94 @@
+"""One run of a batch, as a worker does it: from a scenario to a whole folder, whatever happens."""
+
+import traceback
+from dataclasses import dataclass
+from pathlib import Path
+
+from surgsim.errors import SurgsimError
+from surgsim.runs.folder import execute, summary_of, whole_folder, write_run, write_summary
+from surgsim.scenario.schema import Scenario
+
+REFUSED = "refused"
+WORKER_DIED = "worker_died"
+CRASHED = "crashed"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Job:
+    """A run to be done.
+
+    Attributes:
+        scenario_json: The resolved scenario.
+        folder: The run's folder.
+        record: Whether the recording is written.
+    """
+
+    scenario_json: str
+    folder: str
+    record: bool
+
+    def scenario(self) -> Scenario:
+        """The scenario."""
+        return Scenario.model_validate_json(self.scenario_json)
+
+
+class DiskError(Exception):
+    """The disk refuses a folder: the run is not done, and another one would fare no better."""
+
+
+def do(job: Job) -> str:
+    """Run the job and write its folder; what cannot be started is written as a failed run.
+
+    Returns:
+        Name of the outcome.
+
+    Raises:
+        DiskError: If the folder cannot be written.
+    """
+    scenario, folder = job.scenario(), Path(job.folder)
+    try:
+        result = execute(scenario)
+    except SurgsimError as error:
+        write_failure(scenario, folder, REFUSED, str(error))
+        return REFUSED
+    try:
+        write_run(scenario, result, folder, record=job.record)
+    except SurgsimError as error:
+        raise DiskError(str(error)) from error
+    return result.trace.meta.ending.outcome.name.lower()
+
+
+def attempt(job: Job) -> tuple[str, str]:
+    """Do the job in a process that is to outlive it.
+
+    Returns:
+        `done` and the outcome's name; `disk` and why the folder cannot be written; or `error` and the end
+        of the traceback: a bug is a row of the table, not the end of the batch.
+    """
+    try:
+        return "done", do(job)
+    except DiskError as error:
+        return "disk", str(error)
+    except Exception:
+        return "error", traceback.format_exc(limit=-3)
+
+
+def write_failure(scenario: Scenario, folder: Path, name: str, detail: str) -> None:
+    """Write the folder of a run that gave no trace: its scenario, and an outcome without metrics.
+
+    Raises:
+        DiskError: If the folder cannot be written.
+    """
+    outcome = {"name": name, "sentence": _SENTENCES[name], "t_s": 0.0, "detail": detail, "data": {}}
+    try:
+        with whole_folder(folder) as draft:
+            write_summary(draft, scenario, summary_of(scenario, outcome, {}, 0.0))
+    except SurgsimError as error:
+        raise DiskError(str(error)) from error
+
+
+_SENTENCES = {
+    REFUSED: "The scenario could not be started.",
+    WORKER_DIED: "The process that ran it died at every try.",
+    CRASHED: "The run raised an error inside surgsim: a bug.",
+}

@@ -1,0 +1,80 @@
+"""The leaderboard: a row for each controller, failures beside every figure."""
+
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import pyarrow as pa
+
+from surgsim.compare.aggregates import iqm_interval, mean_rank, ranks, scores
+from surgsim.compare.intervals import Interval
+from surgsim.compare.observations import COMPLETED, Observations, metric_named
+
+_RESAMPLES = 1000
+
+
+@dataclass(frozen=True, kw_only=True)
+class LeaderboardRow:
+    """A controller in the leaderboard of one metric.
+
+    Attributes:
+        controller: Its name.
+        runs: Its runs.
+        completed: Those that ran to their end.
+        failed: Those that did not.
+        failures: Failed runs by outcome.
+        undefined: Completed runs for which the metric is not defined.
+        value: Interquartile mean of the metric over completed runs, in its unit.
+        score: Interquartile mean of the normalised score: 1 is the best controller of each setting.
+        rank: Mean rank over scenarios, failures last.
+    """
+
+    controller: str
+    runs: int
+    completed: int
+    failed: int
+    failures: Mapping[str, int]
+    undefined: int
+    value: Interval
+    score: Interval
+    rank: Interval
+
+
+def leaderboard(table: pa.Table | Observations, metric: str) -> list[LeaderboardRow]:
+    """Rows for `metric`, the best mean rank first.
+
+    Raises:
+        SurgsimError: If the metric is unknown, or the table is not one of batch results.
+    """
+    metric_named(metric)
+    runs = table if isinstance(table, Observations) else Observations.of(table)
+    score, rank = scores(runs, metric), ranks(runs, metric)
+    rows = [_row(runs, name, metric, score, rank) for name in runs.controllers]
+    return sorted(rows, key=_order)
+
+
+def _row(
+    everyone: Observations, name: str, metric: str, score: np.ndarray, rank: np.ndarray
+) -> LeaderboardRow:
+    mine = np.asarray(everyone.controller == name, dtype=bool)
+    runs = everyone.where(mine)
+    values, completed = runs.values(metric), int(runs.completed.sum())
+    identity = f"{metric} {name}"
+    return LeaderboardRow(
+        controller=name,
+        runs=len(runs),
+        completed=completed,
+        failed=len(runs) - completed,
+        failures=dict(Counter(outcome for outcome in runs.outcome.tolist() if outcome != COMPLETED)),
+        undefined=completed - int(np.isfinite(values).sum()),
+        value=iqm_interval(runs, values, identity, _RESAMPLES),
+        score=iqm_interval(runs, score[mine], f"{identity} score", _RESAMPLES),
+        rank=mean_rank(runs, rank[mine], identity, _RESAMPLES),
+    )
+
+
+def _order(row: LeaderboardRow) -> tuple[float, float, str]:
+    """Best mean rank first, then the best score; what has neither comes last."""
+    keys = [np.inf if figure.value is None else figure.value for figure in (row.rank, row.score)]
+    return (keys[0], keys[1], row.controller)

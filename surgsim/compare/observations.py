@@ -1,0 +1,122 @@
+"""The table of a batch as arrays: what the statistics work on."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+from numpy.typing import NDArray
+
+from surgsim.errors import Outcome, SurgsimError, unknown_name
+from surgsim.metrics.catalog import METRICS
+from surgsim.metrics.metric import Metric
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+Texts = NDArray[Any]
+
+COMPLETED = Outcome.COMPLETED.name.lower()
+
+
+@dataclass(frozen=True, kw_only=True)
+class Observations:
+    """Runs of a batch, one entry each.
+
+    Attributes:
+        scenario: Names (n,).
+        controller: Names (n,).
+        parameters: Points of the grid as JSON text (n,).
+        seed: Seeds (n,).
+        outcome: Names of the outcomes (n,).
+        metrics: Values by metric's name (n,); NaN where a metric is not defined.
+    """
+
+    scenario: Texts
+    controller: Texts
+    parameters: Texts
+    seed: NDArray[np.int64]
+    outcome: Texts
+    metrics: Mapping[str, Array]
+
+    @staticmethod
+    def of(table: pa.Table) -> "Observations":
+        """Observations of a batch's table.
+
+        Raises:
+            SurgsimError: If a column is missing or not of its type.
+        """
+        try:
+            texts = {
+                name: _texts(table, name) for name in ("scenario", "controller", "parameters", "outcome")
+            }
+            seed = np.array(table.column("seed").to_pylist(), dtype=np.int64)
+            metrics = {name: _numbers(table, name) for name in METRICS}
+        except (KeyError, TypeError, ValueError, pa.ArrowException) as error:
+            raise SurgsimError(f"not a table of batch results: {error}") from error
+        return Observations(**texts, seed=seed, metrics=metrics)
+
+    def __len__(self) -> int:
+        return len(self.seed)
+
+    @property
+    def completed(self) -> Mask:
+        """Whether a run ran to its end (n,)."""
+        return np.asarray(self.outcome == COMPLETED, dtype=bool)
+
+    @property
+    def controllers(self) -> list[str]:
+        """Names of the controllers in order of appearance."""
+        return list(dict.fromkeys(self.controller.tolist()))
+
+    @property
+    def scenarios(self) -> list[str]:
+        """Names of the scenarios in order of appearance."""
+        return list(dict.fromkeys(self.scenario.tolist()))
+
+    def values(self, metric: str) -> Array:
+        """Values of `metric` (n,); NaN for a run that did not complete."""
+        return np.where(self.completed, self.metrics[metric], np.nan)
+
+    def where(self, mask: Mask) -> "Observations":
+        """The runs of which `mask` is true."""
+        return replace(
+            self,
+            scenario=self.scenario[mask],
+            controller=self.controller[mask],
+            parameters=self.parameters[mask],
+            seed=self.seed[mask],
+            outcome=self.outcome[mask],
+            metrics={name: values[mask] for name, values in self.metrics.items()},
+        )
+
+    def of_controller(self, name: str) -> "Observations":
+        """The runs of one controller."""
+        return self.where(np.asarray(self.controller == name, dtype=bool))
+
+    def of_scenario(self, name: str) -> "Observations":
+        """The runs of one scenario."""
+        return self.where(np.asarray(self.scenario == name, dtype=bool))
+
+
+def metric_named(name: str) -> Metric:
+    """The metric called `name`.
+
+    Raises:
+        SurgsimError: If there is none.
+    """
+    if name not in METRICS:
+        raise SurgsimError(unknown_name(name, "metric", METRICS))
+    return METRICS[name]
+
+
+def _texts(table: pa.Table, name: str) -> Texts:
+    values = table.column(name).to_pylist()
+    if not all(isinstance(value, str) for value in values):
+        raise ValueError(f"column '{name}' holds something other than text")
+    return np.array(values, dtype=object)
+
+
+def _numbers(table: pa.Table, name: str) -> Array:
+    values = table.column(name).cast(pa.float64()).to_numpy()
+    return np.where(np.isfinite(values), values, np.nan)

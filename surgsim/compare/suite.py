@@ -1,0 +1,210 @@
+"""A suite: scenarios, controllers, a grid of parameters and seeds, and the runs that they make."""
+
+import itertools
+import json
+import math
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+from pydantic import AfterValidator, Field
+
+from surgsim.catalog import PartConfig
+from surgsim.errors import ScenarioError, SurgsimError
+from surgsim.scenario.load import find, load_scenario, shipped
+from surgsim.scenario.schema import Name, Scenario
+from surgsim.scenario.validate import validate
+from surgsim.scenario.yaml_text import read_yaml
+
+MOST_RUNS = 100_000
+
+
+def parse_seeds(text: str) -> tuple[int, ...]:
+    """Seeds from `0:10` (0 to 9), `3` or `1,4,9`.
+
+    Raises:
+        ValueError: If the text is none of these, or names no seed.
+    """
+    seeds: list[int] = []
+    for part in text.split(","):
+        match = re.fullmatch(r"\s*(\d{1,9})(?::(\d{1,9}))?\s*", part)
+        if not match:
+            raise ValueError(f"'{text}' is not a list of seeds: write 0:10, 3 or 1,4,9")
+        first = int(match[1])
+        last = int(match[2]) if match[2] else first + 1
+        seeds.extend(range(first, min(last, first + MOST_RUNS + 1)))  # one too many is refused below
+    if not seeds or len(set(seeds)) != len(seeds) or len(seeds) > MOST_RUNS:
+        raise ValueError(f"'{text}' must name between one and {MOST_RUNS} different seeds")
+    return tuple(seeds)
+
+
+def _check_seeds(text: str) -> str:
+    parse_seeds(text)
+    return text
+
+
+class SuiteConfig(PartConfig):
+    """A batch comparison.
+
+    Attributes:
+        name: What its results are called.
+        description: One line about it.
+        scenarios: Shipped names, or paths from the suite's file.
+        controllers: Shipped names, or paths from the suite's file; null: each scenario's own.
+        grid: Key paths of the scenario with the values each takes; every combination is run.
+        seeds: `0:10`, `3` or `1,4,9`.
+        record: Whether every run writes its recording.
+        settings: `key.path=value` settings of every run.
+    """
+
+    name: Name
+    description: str = ""
+    scenarios: Annotated[tuple[str, ...], Field(min_length=1)]
+    controllers: Annotated[tuple[str, ...], Field(min_length=1)] | None = None
+    grid: dict[str, Annotated[tuple[Any, ...], Field(min_length=1)]] = Field(default_factory=dict)
+    seeds: Annotated[str, AfterValidator(_check_seeds)] = "0"
+    record: bool = False
+    settings: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, kw_only=True)
+class RunSpec:
+    """One run of a suite.
+
+    Attributes:
+        scenario: Name or path of the scenario.
+        controller: Name or path of the controller, or None for the scenario's own.
+        parameters: This run's point of the grid.
+        settings: `key.path=value` settings of every run.
+        seed: Its seed.
+        record: Whether it writes its recording.
+    """
+
+    scenario: str
+    controller: str | None
+    parameters: tuple[tuple[str, Any], ...]
+    settings: tuple[str, ...]
+    seed: int
+    record: bool
+
+    def load(self) -> Scenario:
+        """The run's scenario.
+
+        Raises:
+            ScenarioError: If it is not valid.
+        """
+        grid = [f"{key}={json.dumps(value)}" for key, value in self.parameters]
+        return load_scenario(
+            self.scenario, controller=self.controller, assignments=(*self.settings, *grid), seed=self.seed
+        )
+
+
+def load_suite(name: str) -> tuple[SuiteConfig, Path]:
+    """A suite by path or shipped name, with the folder that its paths are relative to.
+
+    Raises:
+        ScenarioError: If anything is wrong with it.
+    """
+    path = find(name, "suites", "suite")
+    return validate(SuiteConfig, read_yaml(path)), path.parent
+
+
+def is_suite(name: str) -> bool:
+    """Whether `name` is a shipped suite, or a file that says `scenarios`."""
+    if name in shipped("suites"):
+        return True
+    path = Path(name)
+    if name in shipped() or path.suffix not in (".yaml", ".yml"):
+        return False
+    return "scenarios" in read_yaml(path).tree
+
+
+def ad_hoc_suite(scenarios: Sequence[str], controllers: Sequence[str] | None) -> SuiteConfig:
+    """A suite of scenarios named on the command line."""
+    names = [Path(scenario).stem for scenario in scenarios]
+    name = names[0] if len(names) == 1 else f"{names[0]}_and_{len(names) - 1}_more"
+    return SuiteConfig(
+        name=re.sub(r"[^a-z0-9_]", "_", name.lower()).lstrip("_")[:64] or "suite",
+        scenarios=tuple(scenarios),
+        controllers=tuple(controllers) if controllers else None,
+    )
+
+
+def expand(suite: SuiteConfig, folder: Path) -> list[RunSpec]:
+    """Every run of `suite`, in a fixed order.
+
+    Raises:
+        SurgsimError: If there are too many.
+    """
+    controllers = suite.controllers or (None,)
+    seeds = parse_seeds(suite.seeds)
+    points = math.prod(len(values) for values in suite.grid.values())
+    count = len(suite.scenarios) * len(controllers) * points * len(seeds)
+    if count > MOST_RUNS:
+        raise SurgsimError(f"suite '{suite.name}' has {count} runs; at most {MOST_RUNS} are allowed")
+    return [
+        RunSpec(
+            scenario=_near(scenario, folder),
+            controller=None if controller is None else _near(controller, folder),
+            parameters=tuple(zip(suite.grid, point, strict=True)),
+            settings=suite.settings,
+            seed=seed,
+            record=suite.record,
+        )
+        for scenario, controller, point, seed in itertools.product(
+            suite.scenarios, controllers, itertools.product(*suite.grid.values()), seeds
+        )
+    ]
+
+
+def _near(name: str, folder: Path) -> str:
+    """`name`, with a relative path taken from the suite's folder."""
+    path = Path(name)
+    if path.suffix in (".yaml", ".yml") and not path.is_absolute():
+        return str(folder / path)
+    return name
+
+
+def check_runs(specs: Sequence[RunSpec]) -> list[Scenario]:
+    """The scenario of every run, each checked before any of them is run.
+
+    Raises:
+        ScenarioError: For the first that is not valid.
+    """
+    scenarios: dict[tuple[Any, ...], Scenario] = {}
+    checked = []
+    for spec in specs:
+        key = (spec.scenario, spec.controller, json.dumps(spec.parameters), spec.settings)
+        if key not in scenarios:
+            scenarios[key] = spec.load()
+        elif spec.seed < 0:
+            raise ScenarioError("--seeds", f"{spec.seed} is not allowed: must be 0 or more")
+        checked.append(scenarios[key].model_copy(update={"seed": spec.seed}))
+    return checked
+
+
+def with_changes(
+    suite: SuiteConfig, controllers: Sequence[str] | None, seeds: str | None, record: bool
+) -> SuiteConfig:
+    """`suite` with what the command line says instead.
+
+    Raises:
+        ScenarioError: If the seeds cannot be read.
+    """
+    changes: dict[str, Any] = {"record": suite.record or record}
+    if controllers is not None:
+        changes["controllers"] = tuple(_from_here(name) for name in controllers)
+    if seeds is not None:
+        try:
+            parse_seeds(seeds)
+        except ValueError as error:
+            raise ScenarioError("--seeds", str(error)) from error
+        changes["seeds"] = seeds
+    return suite.model_copy(update=changes)
+
+
+def _from_here(name: str) -> str:
+    """`name`, with a relative path taken from the working directory: the user typed it there."""
+    return str(Path(name).absolute()) if Path(name).suffix in (".yaml", ".yml") else name

@@ -1,0 +1,125 @@
+"""The tidy table: one row per run, failures included."""
+
+import json
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pyarrow as pa
+import pyarrow.csv
+import pyarrow.parquet
+
+from surgsim.errors import SurgsimError
+from surgsim.metrics.catalog import METRICS
+from surgsim.metrics.timing import TIMING_METRICS
+
+TEXT_COLUMNS = ("run_id", "suite", "scenario", "controller")
+PARQUET, CSV = "runs.parquet", "runs.csv"
+MACHINE_COLUMNS = (*sorted(TIMING_METRICS), "wall_time_s")
+"""Columns that measure the machine: they differ between two equal batches."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Row:
+    """Where a row of the table comes from.
+
+    Attributes:
+        run_id: What tells it apart in the suite.
+        suite: Name of the suite.
+        parameters: Its point of the grid.
+        folder: Its folder, relative to the results.
+    """
+
+    run_id: str
+    suite: str
+    parameters: Mapping[str, Any]
+    folder: str
+
+
+def schema() -> pa.Schema:
+    """Columns and types of the table."""
+    fields = [pa.field(name, pa.string()) for name in TEXT_COLUMNS]
+    fields += [pa.field("seed", pa.int64()), pa.field("parameters", pa.string())]
+    fields += [pa.field("outcome", pa.string()), pa.field("outcome_t_s", pa.float64())]
+    fields += [pa.field("outcome_detail", pa.string())]
+    fields += [pa.field(name, pa.float64()) for name in METRICS]
+    fields += [pa.field("wall_time_s", pa.float64())]
+    texts = ("scenario_sha256", "surgsim_version", "commit", "machine", "folder", "recording")
+    return pa.schema(fields + [pa.field(name, pa.string()) for name in texts])
+
+
+def read_row(root: Path, row: Row) -> dict[str, Any]:
+    """A run's row, read from its folder.
+
+    Raises:
+        SurgsimError: If the folder is not a whole run.
+    """
+    path = root / row.folder / "metrics.json"
+    try:
+        summary = json.loads(path.read_text())
+        outcome, provenance = summary["outcome"], summary["provenance"]
+        recording = f"{row.folder}/recording.rrd"
+        return {
+            "run_id": row.run_id,
+            "suite": row.suite,
+            "scenario": summary["scenario"],
+            "controller": summary["controller"],
+            "seed": summary["seed"],
+            "parameters": json.dumps(row.parameters, sort_keys=True),
+            "outcome": outcome["name"],
+            "outcome_t_s": outcome["t_s"],
+            "outcome_detail": outcome["detail"],
+            **{name: summary["metrics"].get(name) for name in METRICS},
+            "wall_time_s": provenance["wall_time_s"],
+            "scenario_sha256": provenance["scenario_sha256"],
+            "surgsim_version": provenance["surgsim"],
+            "commit": provenance["commit"],
+            "machine": provenance["machine"],
+            "folder": row.folder,
+            "recording": recording if (root / recording).is_file() else None,
+        }
+    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+        raise SurgsimError(f"{path} is not a run's metrics.json: {error}") from error
+
+
+def write_table(root: Path, rows: Sequence[Row]) -> pa.Table:
+    """Read every run's folder below `root` and write `runs.parquet` and `runs.csv` beside them.
+
+    Raises:
+        SurgsimError: If a run is missing or damaged, or the disk refuses.
+    """
+    try:
+        table = pa.Table.from_pylist([read_row(root, row) for row in rows], schema=schema())
+    except pa.ArrowException as error:
+        raise SurgsimError(f"a metrics.json below {root} holds a value of another type: {error}") from error
+    try:
+        for name, write in ((PARQUET, pa.parquet.write_table), (CSV, pa.csv.write_csv)):
+            draft = root / f".{name}.part"
+            write(table, draft)
+            os.replace(draft, root / name)
+    except OSError as error:
+        raise SurgsimError(f"cannot write the table in {root}: {error.strerror or error}") from error
+    return table
+
+
+def read_table(root: Path) -> pa.Table:
+    """The table of a results folder.
+
+    Raises:
+        SurgsimError: If there is none, or it is not one of surgsim's.
+    """
+    path = root / PARQUET
+    if not path.is_file():
+        raise SurgsimError(f"{root} holds no {PARQUET}: it is no folder of batch results, or not finished")
+    try:
+        table = pa.parquet.read_table(path)
+    except (OSError, pa.ArrowException) as error:
+        raise SurgsimError(f"{path} is damaged: {str(error).splitlines()[0]}") from error
+    missing = [name for name in schema().names if name not in table.column_names]
+    if missing:
+        raise SurgsimError(f"{path} has no column '{missing[0]}': it is not a table of this version")
+    if table.num_rows == 0:
+        raise SurgsimError(f"{path} has no rows")
+    return table

@@ -1,0 +1,198 @@
+"""Worker processes that survive each other's death."""
+
+import multiprocessing
+import os
+import signal
+import threading
+from collections import deque
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field
+from multiprocessing.connection import Connection, wait
+from pathlib import Path
+from typing import Any
+
+from surgsim.compare.job import CRASHED, WORKER_DIED, DiskError, Job, attempt, write_failure
+from surgsim.errors import SurgsimError
+
+TRIES = 2
+_MOST_STILLBORN = 5
+_SPAWN = multiprocessing.get_context("spawn")
+
+
+@dataclass
+class _Worker:
+    """A process and what it is doing."""
+
+    process: Any
+    pipe: Connection
+    index: int | None = None
+    began: bool = False
+
+
+@dataclass(frozen=True, kw_only=True)
+class Done:
+    """A finished job.
+
+    Attributes:
+        index: Which of the jobs.
+        outcome: Name of its outcome.
+    """
+
+    index: int
+    outcome: str
+
+
+def run_jobs(jobs: Sequence[Job], count: int) -> Iterator[Done]:
+    """Do all jobs in `count` processes and yield each as it is finished.
+
+    A worker that dies is replaced and its job tried once more; if that worker dies too, the run is written
+    as failed. A full disk ends the batch: what is whole stays, and a later call with the rest goes on.
+
+    Raises:
+        SurgsimError: If the disk refuses a folder, or processes cannot start.
+    """
+    pool = _Pool(jobs=jobs, waiting=deque(range(len(jobs))))
+    try:
+        for _ in range(min(count, len(jobs))):
+            pool.hire()
+        while pool.busy:
+            yield from pool.collect()
+    finally:
+        pool.dismiss()
+
+
+@dataclass
+class _Pool:
+    jobs: Sequence[Job]
+    waiting: deque[int]
+    workers: list[_Worker] = field(default_factory=list)
+    tries: dict[int, int] = field(default_factory=dict)
+    stillborn: int = 0
+
+    @property
+    def busy(self) -> bool:
+        return any(worker.index is not None for worker in self.workers)
+
+    def hire(self) -> None:
+        """Start a process, and give it the next job."""
+        here, there = _SPAWN.Pipe()
+        process = _SPAWN.Process(target=_serve, args=(there,), daemon=True)
+        process.start()
+        there.close()
+        worker = _Worker(process, here)
+        self.workers.append(worker)
+        self.assign(worker)
+
+    def assign(self, worker: _Worker) -> None:
+        """Give `worker` the next job, if there is one."""
+        worker.index = None
+        if self.waiting:
+            index = self.waiting.popleft()
+            self.tries[index] = self.tries.get(index, 0) + 1
+            worker.index = index
+            with suppress(OSError):  # it died while idle: `collect` sees its sentinel
+                worker.pipe.send(self.jobs[index])
+
+    def collect(self) -> list[Done]:
+        """Wait until a worker answers or dies."""
+        ready = wait([w.pipe for w in self.workers] + [w.process.sentinel for w in self.workers])
+        done: list[Done] = []
+        for worker in list(self.workers):
+            if worker.pipe in ready:
+                done.extend(self.answer(worker))
+            elif worker.process.sentinel in ready:
+                done.extend(self.bury(worker))
+        return done
+
+    def answer(self, worker: _Worker) -> list[Done]:
+        """Take a worker's answer and give it the next job."""
+        try:
+            kind, text = worker.pipe.recv()
+        except (EOFError, OSError):
+            return self.bury(worker)
+        if kind == "ready":
+            worker.began, self.stillborn = True, 0
+            return []
+        index = worker.index
+        if index is None:
+            return []
+        if kind == "disk":
+            raise stopped(text)
+        if kind == "error":
+            record_failure(self.jobs[index], CRASHED, text)
+            text = CRASHED
+        self.assign(worker)
+        return [Done(index=index, outcome=text)]
+
+    def bury(self, worker: _Worker) -> list[Done]:
+        """Replace a dead worker; its job is tried again, or given up."""
+        self.workers.remove(worker)
+        worker.pipe.close()
+        worker.process.join()
+        index, done, detail = worker.index, [], f"exit code {worker.process.exitcode}"
+        if not worker.began:
+            self.stillborn += 1
+            if self.stillborn >= _MOST_STILLBORN:
+                raise SurgsimError(f"worker processes end before they can begin ({detail})")
+            if index is not None:  # not the job's fault
+                self.tries[index] -= 1
+        if index is not None:
+            if self.tries[index] < TRIES:
+                self.waiting.appendleft(index)
+            else:
+                record_failure(self.jobs[index], WORKER_DIED, detail)
+                done = [Done(index=index, outcome=WORKER_DIED)]
+        if self.waiting:
+            self.hire()
+        return done
+
+    def dismiss(self) -> None:
+        """End all processes."""
+        for worker in self.workers:
+            worker.pipe.close()
+            worker.process.terminate()
+        for worker in self.workers:
+            worker.process.join(10)
+
+
+def stopped(text: str) -> SurgsimError:
+    """What ends a batch that cannot go on."""
+    return SurgsimError(f"{text}; what is whole stays, --resume goes on with the rest")
+
+
+def record_failure(job: Job, name: str, detail: str) -> None:
+    """Write the folder of a job that ended without one.
+
+    Raises:
+        SurgsimError: If the disk refuses.
+    """
+    try:
+        write_failure(job.scenario(), Path(job.folder), name, detail)
+    except DiskError as error:
+        raise stopped(str(error)) from error
+
+
+def _serve(pipe: Connection) -> None:
+    """A worker's life: jobs in, outcomes out, until the pipe closes or the parent is gone."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent decides
+    threading.Thread(target=_die_with_parent, daemon=True).start()
+    with suppress(OSError):
+        pipe.send(("ready", ""))
+    while True:
+        try:
+            job = pipe.recv()
+        except (EOFError, OSError):
+            return
+        try:
+            pipe.send(attempt(job))
+        except OSError:
+            return
+
+
+def _die_with_parent() -> None:
+    """End at once when the parent does, so that a resumed batch never meets an old worker."""
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        parent.join()
+        os._exit(1)

@@ -1,0 +1,1 @@
+"""Policies: callables from what a controller sees to what it should do."""

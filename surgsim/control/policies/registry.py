@@ -1,0 +1,82 @@
+"""Policies by name: shipped, from entry points of other packages, or registered in this process."""
+
+import importlib
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from contextvars import ContextVar
+from importlib.metadata import entry_points
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from surgsim.errors import SurgsimError, unknown_name
+
+GROUP = "surgsim.policies"
+Policy = Callable[[Mapping[str, NDArray[np.float64]]], ArrayLike]
+"""An observation, see `observe`, to an action. A `reset` method, if it has one, is called before a run."""
+
+_SHIPPED = {
+    "damping": "surgsim.control.policies.shipped:damping",
+    "proportional": "surgsim.control.policies.shipped:proportional",
+}
+_registered: dict[str, Policy] = {}
+_offered: ContextVar[tuple[tuple[str, Policy], ...]] = ContextVar("offered", default=())
+
+
+def policy_names() -> list[str]:
+    """Names of all policies, sorted."""
+    return sorted({**_places(), **_registered, **dict(_offered.get())})
+
+
+def register_policy(name: str, policy: Policy) -> None:
+    """Let scenarios of this process name `policy`; registering again replaces it.
+
+    Worker processes do not know it: for `compare`, give it an entry point of the group `surgsim.policies`.
+
+    Raises:
+        SurgsimError: If an installed policy has this name, or it cannot be called.
+    """
+    if name in _places():
+        raise SurgsimError(f"policy '{name}' is installed already: choose another name")
+    if not callable(policy):
+        raise SurgsimError(f"policy '{name}' cannot be called: it is {policy!r}")
+    _registered[name] = policy
+
+
+@contextmanager
+def offering(name: str, policy: Policy) -> Iterator[None]:
+    """Within the block, controllers that are built find `policy` under `name`."""
+    token = _offered.set((*_offered.get(), (name, policy)))
+    try:
+        yield
+    finally:
+        _offered.reset(token)
+
+
+def find_policy(name: str) -> Policy:
+    """The policy `name`.
+
+    Raises:
+        SurgsimError: If there is none, or it does not load.
+    """
+    known = {**_registered, **dict(_offered.get())}
+    if name in known:
+        return known[name]
+    places = _places()
+    if name not in places:
+        raise SurgsimError(
+            f"{unknown_name(name, 'policy', [*places, *known])} A policy that was registered in one process "
+            f"is not known to another: give it an entry point of the group '{GROUP}'."
+        )
+    module, _, attribute = places[name].partition(":")
+    try:
+        policy = getattr(importlib.import_module(module), attribute)
+    except (ImportError, AttributeError) as error:
+        raise SurgsimError(f"policy '{name}' does not load: {error}") from error
+    if not callable(policy):
+        raise SurgsimError(f"policy '{name}' ({places[name]}) cannot be called")
+    return policy  # type: ignore[no-any-return]
+
+
+def _places() -> dict[str, str]:
+    return {**{point.name: point.value for point in entry_points(group=GROUP)}, **_SHIPPED}

@@ -1,0 +1,87 @@
+"""Two recordings as one: side by side on one timeline."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import rerun as rr
+import rerun.blueprint as rrb
+
+from surgsim.errors import RecordingError
+from surgsim.recording.blueprint import plot, scene_view
+from surgsim.recording.files import replacing
+from surgsim.recording.layout import APPLICATION, ERRORS, LIMITS, TIMELINE, series_path
+from surgsim.recording.read import Recorded
+from surgsim.recording.scene import log_scene, scenario_of
+from surgsim.recording.signals import log_signals
+from surgsim.trace.trace import Trace
+
+_SIDES = ("a", "b")
+
+
+def write_pair(path: Path, pair: Sequence[Recorded]) -> None:
+    """Write two runs into one recording, each below an entity of its own, with a layout of two columns.
+
+    Raises:
+        RecordingError: If the file cannot be written whole.
+    """
+    stream = rr.RecordingStream(APPLICATION, send_properties=False)
+    traces = [recorded.trace for recorded in pair]
+    with replacing(path) as temporary:
+        stream.save(temporary, default_blueprint=_blueprint(traces))
+        stream.send_recording_name(" | ".join(title(trace) for trace in traces))
+        for side, trace in zip(_SIDES, traces, strict=True):
+            below = _Below(stream, side)
+            log_signals(below, trace)
+            log_scene(below, scenario_of(trace), trace)
+        try:
+            stream.flush()
+            stream.disconnect()
+        except RuntimeError as error:
+            raise RecordingError(f"{path}: cannot be written whole; is the disk full? ({error})") from error
+
+
+def title(trace: Trace) -> str:
+    """Controller, scenario and seed of a run."""
+    scenario = trace.meta.scenario
+    return f"{scenario['controller']['name']} · {scenario['name']} · seed {scenario['seed']}"
+
+
+class _Below:
+    """A stream that puts every entity below `side`."""
+
+    def __init__(self, stream: rr.RecordingStream, side: str) -> None:
+        self._stream = stream
+        self._side = side
+
+    def log(self, path: str, *parts: Any, **options: Any) -> None:
+        """As the stream's."""
+        self._stream.log(f"{self._side}/{path}", *parts, **options)
+
+    def send_columns(self, path: str, *parts: Any, **options: Any) -> None:
+        """As the stream's."""
+        self._stream.send_columns(f"{self._side}/{path}", *parts, **options)
+
+
+def _blueprint(traces: Sequence[Trace]) -> rrb.Blueprint:
+    columns = [_column(side, trace) for side, trace in zip(_SIDES, traces, strict=True)]
+    return rrb.Blueprint(
+        rrb.Horizontal(*columns),
+        rrb.BlueprintPanel(state="collapsed"),
+        rrb.SelectionPanel(state="collapsed"),
+        rrb.TimePanel(state="collapsed", timeline=TIMELINE),
+        auto_views=False,
+    )
+
+
+def _column(side: str, trace: Trace) -> rrb.Vertical:
+    """Scene, errors, manipulability and torques of one run."""
+    return rrb.Vertical(
+        scene_view(scenario_of(trace), trace, below=f"{side}/", name=title(trace)),
+        rrb.Horizontal(
+            plot("Tip and RCM error [mm]", f"{side}/{ERRORS}"),
+            plot("Manipulability", f"{side}/{series_path('manipulability')}"),
+            plot("Torque [N m]", f"{side}/{series_path('tau')}", f"{side}/{LIMITS}/tau"),
+        ),
+        row_shares=[0.62, 0.38],
+    )

@@ -1,0 +1,102 @@
+"""What the report is about: the table of a batch and what is written about it."""
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from surgsim.compare.observations import Observations
+from surgsim.compare.table import read_table
+from surgsim.errors import SurgsimError
+from surgsim.metrics.catalog import METRICS
+
+_HEADLINE = (
+    "rcm_error_rms_mm",
+    "tip_error_rms_mm",
+    "manipulability_mean",
+    "trocar_force_max_n",
+    "velocity_error_rms_mm_per_s",
+)
+_SHOWN = (
+    "rcm_error_rms_mm",
+    "rcm_error_max_mm",
+    "tip_error_rms_mm",
+    "tip_error_max_mm",
+    "manipulability_mean",
+    "manipulability_min",
+    "manipulability_optimality",
+    "trocar_force_max_n",
+    "velocity_error_rms_mm_per_s",
+)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Results:
+    """A batch.
+
+    Attributes:
+        folder: Its results folder.
+        rows: The table, a mapping for each run.
+        runs: The same as arrays.
+        suite: What `suite.json` says; empty without one.
+    """
+
+    folder: Path
+    rows: Sequence[Mapping[str, Any]]
+    runs: Observations
+    suite: Mapping[str, Any]
+
+    @property
+    def metrics(self) -> list[str]:
+        """Metrics that any completed run has."""
+        return [name for name in METRICS if np.isfinite(self.runs.values(name)).any()]
+
+    @property
+    def headline(self) -> list[str]:
+        """Metrics that are ranked and compared in pairs."""
+        return [name for name in _HEADLINE if name in self.metrics] or self.metrics[:1]
+
+    @property
+    def shown(self) -> list[str]:
+        """Metrics drawn for each scenario without unfolding."""
+        return [name for name in _SHOWN if name in self.metrics]
+
+
+def read_results(folder: Path) -> Results:
+    """Read the results folder of a batch.
+
+    Raises:
+        SurgsimError: If there is no table, it is damaged or empty, or `suite.json` cannot be read.
+    """
+    if not folder.is_dir():
+        raise SurgsimError(f"{folder} is not a folder; give the one that `surgsim compare` wrote")
+    table = read_table(folder)
+    try:
+        runs = Observations.of(table)
+    except SurgsimError as error:
+        raise SurgsimError(f"{folder / 'runs.parquet'}: {error}") from error
+    return Results(folder=folder, rows=table.to_pylist(), runs=runs, suite=_suite(folder / "suite.json"))
+
+
+def _suite(path: Path) -> Mapping[str, Any]:
+    if not path.is_file():
+        return {}
+    try:
+        found = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise SurgsimError(f"{path} is damaged: {error}") from error
+    if not isinstance(found, dict):
+        raise SurgsimError(f"{path} is damaged: it holds no object")
+    return found
+
+
+def parameters_of(text: str) -> dict[str, Any]:
+    """A run's point of the grid; empty if it cannot be read."""
+    try:
+        found = json.loads(text)
+    except ValueError:
+        return {}
+    return found if isinstance(found, dict) else {}

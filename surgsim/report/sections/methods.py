@@ -1,0 +1,50 @@
+"""How the figures are made, and with what."""
+
+import json
+from pathlib import Path
+from string import Template
+from typing import Any
+
+from surgsim.compare.intervals import FEWEST, RESAMPLES
+from surgsim.metrics.catalog import METRICS
+from surgsim.report import html
+from surgsim.report.results import Results
+
+
+def methods_section(results: Results) -> str:
+    """Methods in words, and the meaning of every metric."""
+    template = Template(Path(__file__).with_name("methods.html").read_text(encoding="utf-8"))
+    words = template.substitute(resamples=RESAMPLES, fewest=FEWEST)
+    better = {True: "less", False: "more", None: "neither"}
+    rows = [
+        [
+            f'<th scope="row">{name}</th>',
+            html.escape(METRICS[name].meaning),
+            better[METRICS[name].lower_is_better],
+        ]
+        for name in results.metrics
+    ]
+    missing = [name for name in METRICS if name not in results.metrics]
+    text = f"Not defined in any completed run: {', '.join(missing)}." if missing else ""
+    metrics = html.table("Metrics", ["metric", "meaning", "better"], rows, "wide")
+    return html.section("methods", "Methods", words, "<h3>Metrics</h3>", metrics, html.paragraph(text))
+
+
+def versions_section(results: Results) -> str:
+    """The command, versions, machines and scenario hashes."""
+    suite = results.suite
+    provenance = suite.get("provenance") or {}
+    facts: list[tuple[str, Any]] = [("command", suite.get("command")), ("seeds", suite.get("seeds"))]
+    facts += [("grid", json.dumps(suite["grid"]))] if suite.get("grid") else []
+    facts += [("settings", json.dumps(suite["settings"]))] if suite.get("settings") else []
+    for label, column in (("surgsim", "surgsim_version"), ("commit", "commit"), ("machine", "machine")):
+        facts.append((label, ", ".join(sorted({str(row[column]) for row in results.rows if row[column]}))))
+    facts.append(("python", provenance.get("python")))
+    packages = provenance.get("packages") or {}
+    facts.append(("packages", ", ".join(f"{name} {version}" for name, version in packages.items())))
+    shown = "".join(
+        f"<dt>{html.escape(name)}</dt><dd>{html.escape(value)}</dd>" for name, value in facts if value
+    )
+    mixed = len({(row["surgsim_version"], row["commit"]) for row in results.rows}) > 1
+    warning = html.paragraph("Runs of several versions are mixed.", "warning") if mixed else ""
+    return html.section("versions", "Versions", warning, f"<dl>{shown}</dl>")

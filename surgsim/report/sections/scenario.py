@@ -1,0 +1,134 @@
+"""A scenario: box plots, errors over time, manipulability, robustness, comparisons."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from surgsim.compare.observations import Observations
+from surgsim.compare.wording import number
+from surgsim.metrics.catalog import METRICS
+from surgsim.report import html
+from surgsim.report.figures.boxes import MOST_POINTS, Group, box_plot
+from surgsim.report.figures.curves import Curve, curve_plot
+from surgsim.report.results import Results, parameters_of
+from surgsim.report.sections.frontier import frontiers
+from surgsim.report.sections.leaderboard import metric_label
+from surgsim.report.sections.pairs import comparison_table
+from surgsim.report.series import COLUMNS, Series
+
+
+def scenario_section(results: Results, name: str, index: int, series: Series | None) -> str:
+    """Everything about one scenario."""
+    runs = results.runs.of_scenario(name)
+    controllers = results.runs.controllers
+    dexterity = [metric for metric in results.shown if metric.startswith("manipulability")]
+    errors = [metric for metric in results.shown if metric not in dexterity]
+    rest = [metric for metric in results.metrics if metric not in results.shown]
+    return html.section(
+        f"scenario-{index}",
+        name,
+        html.paragraph(_facts(runs)),
+        html.legend(controllers),
+        "<h3>Errors and forces</h3>",
+        html.figures(*(_boxes(runs, controllers, metric) for metric in errors)),
+        "<h3>Over time</h3>" + _over_time(series, controllers, ("rcm_error_m", "tip_error_m")),
+        "<h3>Manipulability</h3>" if dexterity else "",
+        html.figures(
+            *(_boxes(runs, controllers, metric) for metric in dexterity),
+            *_bands(series, controllers, ("manipulability",)),
+        ),
+        frontiers(runs, results, controllers),
+        _compared(results, name),
+        html.details("More metrics", html.figures(*(_boxes(runs, controllers, m) for m in rest)))
+        if rest
+        else "",
+    )
+
+
+def _facts(runs: Observations) -> str:
+    done, seeds = int(runs.completed.sum()), len(set(runs.seed.tolist()))
+    points = len(set(runs.parameters.tolist()))
+    grid = f" × {points} grid points" if points > 1 else ""
+    pooled = " Box plots pool the grid points." if points > 1 else ""
+    return (
+        f"{len(runs)} runs: {len(runs.controllers)} controllers × {seeds} seeds{grid}; {done} completed, "
+        f"{len(runs) - done} failed.{pooled}"
+    )
+
+
+def _boxes(runs: Observations, controllers: Sequence[str], metric: str) -> str:
+    groups = []
+    for index, name in enumerate(controllers):
+        mine = runs.of_controller(name)
+        values = mine.values(metric)
+        failed = len(mine) - int(mine.completed.sum())
+        if len(mine):
+            finite = values[np.isfinite(values)]
+            groups.append(Group(name=name, index=index, values=finite, runs=len(mine), failed=failed))
+    if not any(group.values.size for group in groups):
+        return ""
+    many = any(group.values.size > MOST_POINTS for group in groups)
+    note = METRICS[metric].meaning + (f"; {MOST_POINTS} points of each drawn" if many else "")
+    return html.figure(box_plot(groups, metric_label(metric)), metric, note)
+
+
+def _over_time(series: Series | None, controllers: Sequence[str], columns: Sequence[str]) -> str:
+    if series is None:
+        return html.paragraph(
+            "No recording is at hand, so errors over time are not drawn. "
+            "`surgsim compare --record` writes recordings."
+        )
+    point = ", ".join(f"{key} = {value}" for key, value in parameters_of(series.parameters).items())
+    runs = sum(len(next(iter(mine.values()))) for mine in series.completed.values())
+    failed = sum(len(next(iter(mine.values()))) for mine in series.failed.values())
+    if not runs + failed:
+        return html.paragraph(f"None of {series.unreadable} recordings could be read.", "warning")
+    text = (
+        f"Median and 10–90 % band of {runs} recorded runs{f' at {point}' if point else ''}; each point is "
+        f"the worst of its slice of {number(float(series.time_s[1] - series.time_s[0]))} s."
+    )
+    if failed:
+        text += f" {failed} failed: of each controller up to three are thin lines that end in a cross."
+    if series.unreadable:
+        text += f" {series.unreadable} recordings could not be read."
+    return html.paragraph(text) + html.figures(*_bands(series, controllers, columns))
+
+
+def _bands(series: Series | None, controllers: Sequence[str], columns: Sequence[str]) -> list[str]:
+    if series is None:
+        return []
+    drawn = []
+    for column in columns:
+        curves = [_curve(series, name, index, column) for index, name in enumerate(controllers)]
+        there = [curve for curve in curves if curve is not None]
+        if there:
+            label = COLUMNS[column][0]
+            drawn.append(
+                html.figure(curve_plot(there, "time [s]", label), f"{label.split(' [')[0]} over time")
+            )
+    return drawn
+
+
+def _curve(series: Series, name: str, index: int, column: str) -> Curve | None:
+    done = series.completed.get(name, {}).get(column, np.empty((0, series.time_s.size)))
+    failed = series.failed.get(name, {}).get(column, np.empty((0, series.time_s.size)))
+    if not np.isfinite(done).any() and not np.isfinite(failed).any():
+        return None
+    some = np.isfinite(done).any(axis=0)
+    middle, low, high = (np.full(series.time_s.size, np.nan) for _ in range(3))
+    if some.any():
+        low[some], middle[some], high[some] = np.nanpercentile(done[:, some], [10, 50, 90], axis=0)
+    band = (low, high) if len(done) > 1 else (None, None)
+    return Curve(
+        index=index, x=series.time_s, middle=middle, low=band[0], high=band[1], ended=tuple(failed[:3])
+    )
+
+
+def _compared(results: Results, name: str) -> str:
+    if len(results.runs.controllers) < 2:
+        return ""
+    tables = [
+        f"<h4>{html.escape(metric)}</h4>{comparison_table(results, metric, name)}"
+        for metric in results.headline
+    ]
+    return html.details("Controllers in pairs, in this scenario", *tables)

@@ -1,0 +1,38 @@
+"""Writing the report."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+from surgsim.recording.files import replacing
+from surgsim.report.page import page
+from surgsim.report.results import read_results
+from surgsim.report.series import read_series
+
+NAME = "report.html"
+
+
+def _silent(_: str) -> None:
+    """Say nothing."""
+
+
+def write_report(folder: Path, out: Path | None = None, say: Callable[[str], None] = _silent) -> Path:
+    """Write the report of the batch in `folder`, whole or not at all.
+
+    Args:
+        folder: Results folder of `surgsim compare`.
+        out: File to write; `report.html` in the folder if None.
+        say: Told what takes long.
+
+    Returns:
+        The file.
+
+    Raises:
+        SurgsimError: If there are no results, they are damaged, or the disk refuses.
+    """
+    results = read_results(folder)
+    file = out if out is not None else folder / NAME
+    series = read_series(folder, results.rows, results.runs.scenarios, say)
+    text = page(results, series, file)
+    with replacing(file) as draft:
+        draft.write_text(text, encoding="utf-8")
+    return file

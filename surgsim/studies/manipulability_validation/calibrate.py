@@ -1,0 +1,185 @@
+"""How the homes were found: least squares on the six averages that Table 4 gives for each of them.
+
+    from surgsim.studies.manipulability_validation.calibrate import search
+    for candidate in search(home=3, seed=1): print(candidate)
+
+takes about a minute a home. Homes 1 and 3 of `setup.py` are its first candidates with seed 1. Everything is
+evaluated for many homes at once on a kinematic model of its own, so that it also checks the study's runs.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from surgsim.studies.manipulability_validation import paper
+
+Array = NDArray[np.float64]
+
+GAIN = 0.4
+"""(c3/c2) T [s]: with the homes, the only constant that the averages depend on."""
+
+MARGIN_RAD = 0.02
+LINK_OFFSETS_M = (0.31, 0.0, 0.4, 0.0, 0.39, 0.0, 0.078)
+_TWIST_SIGNS = (1.0, -1.0, -1.0, 1.0, 1.0, -1.0)
+_LIMITS_RAD = np.deg2rad([170.0, 120.0, 170.0, 120.0, 170.0, 120.0])
+
+
+@dataclass(frozen=True, kw_only=True)
+class Candidate:
+    """A home that was found.
+
+    Attributes:
+        q_rad: Joint positions q1..q6 [rad].
+        worst: Largest relative deviation from Table 4's six averages.
+        margin_rad: Smallest distance of a joint from its limit along the three paths [rad].
+    """
+
+    q_rad: tuple[float, ...]
+    worst: float
+    margin_rad: float
+
+
+def search(home: int, seed: int, count: int = 200_000) -> list[Candidate]:
+    """The best homes of a random search with refinement, best first; every path inside the joint limits."""
+    target = table_4_averages(home)
+    q = _screen(target, np.random.default_rng(seed), count, keep=60)
+    for steps, rounds, keep in ((120, 12, 12), (400, 6, 4), (1000, 3, 4)):
+        q = refine(q, target, steps, rounds)[:keep]
+    found, margin = averages(q, 1000)
+    worst = np.abs(found / target - 1.0).max(axis=1)
+    order = np.argsort(worst)
+    return [
+        Candidate(
+            q_rad=tuple(float(x) for x in np.round(q[i], 4)),
+            worst=float(worst[i]),
+            margin_rad=float(margin[i]),
+        )
+        for i in order
+    ]
+
+
+def table_4_averages(home: int) -> Array:
+    """Table 4's averages (6,): not optimised on circle, sinusoid and spiral, then optimised."""
+    tables = (paper.TABLE_4_NOT_OPTIMISED, paper.TABLE_4_OPTIMISED)
+    return np.array([table[path][home - 1] for table in tables for path in paper.PATHS])
+
+
+def averages(q: Array, steps: int) -> tuple[Array, Array]:
+    """Averages of mu of many homes (n, 6) [rad], without joint limits.
+
+    The optimised ones are those of the network's steady state, q' = J+ v + (c3/c2) N grad(ln mu).
+
+    Returns:
+        Averages (n, 6), in the order of `table_4_averages`; smallest distance from a joint limit (n,) [rad].
+    """
+    found, margin = np.empty((len(q), 6)), np.full(len(q), np.inf)
+    for column, path in enumerate(_paths(steps)):
+        for row, gain in enumerate((0.0, GAIN)):
+            found[:, column + 3 * row], near = _follow(q, path, gain / steps)
+            margin = np.minimum(margin, near)
+    return found, margin
+
+
+def _follow(q: Array, path: Array, gain: float) -> tuple[Array, Array]:
+    """Average of mu (n,) and smallest joint margin (n,) along a path of steps."""
+    total, margin = np.zeros(len(q)), np.full(len(q), np.inf)
+    for k in range(len(path)):
+        J, z = kinematics(q)
+        margin = np.minimum(margin, (_LIMITS_RAD - np.abs(q)).min(axis=1))
+        A = np.einsum("nji,njk->nik", J, J)
+        if k:
+            total += np.sqrt(np.maximum(np.linalg.det(A), 0.0))
+        if k == len(path) - 1:
+            break
+        inverse = np.linalg.inv(A + 1e-14 * np.eye(3))
+        dq = np.einsum("nji,nik,k->nj", J, inverse, path[k + 1] - path[k])
+        if gain:
+            g = gain * _log_gradient(J, z, inverse)
+            dq += g - np.einsum("nji,nik,nlk,nl->nj", J, inverse, J, g, optimize=True)
+        q = q + np.clip(dq, -0.5, 0.5)[:, :6]
+    return total / (len(path) - 1), margin
+
+
+def kinematics(q: Array) -> tuple[Array, Array]:
+    """Translational Jacobian of the flange, a row a joint (n, 7, 3), and joint axes (n, 7, 3)."""
+    n = len(q)
+    x, y, z = (np.tile(axis, (n, 1)) for axis in np.eye(3))
+    p, axes, anchors = np.zeros((n, 3)), np.empty((n, 7, 3)), np.empty((n, 7, 3))
+    for i, offset in enumerate(LINK_OFFSETS_M):
+        axes[:, i], anchors[:, i] = z, p
+        p = p + offset * z
+        if i < 6:
+            c, s = np.cos(q[:, i : i + 1]), np.sin(q[:, i : i + 1])
+            x, y = c * x + s * y, c * y - s * x
+            y, z = _TWIST_SIGNS[i] * z, -_TWIST_SIGNS[i] * y
+    return np.cross(axes, p[:, None] - anchors), axes
+
+
+def _log_gradient(J: Array, z: Array, inverse: Array) -> Array:
+    """Gradient of ln mu (n, 7): sum over j of (dJ_j/dq_i) . (J J^T)^-1 J_j."""
+    weights = J @ inverse
+    gradient = np.empty(J.shape[:2])
+    for i in range(7):
+        change = np.concatenate(
+            (np.cross(z[:, :i], J[:, i, None]), np.cross(z[:, i, None], J[:, i:])), axis=1
+        )
+        gradient[:, i] = np.einsum("njk,njk->n", change, weights)
+    return gradient
+
+
+def _paths(steps: int) -> list[Array]:
+    """Circle, sinusoid and spiral (steps + 1, 3) [m], each from the origin."""
+    s = np.linspace(0.0, 1.0, steps + 1)
+    a, zero = 2.0 * np.pi * s, np.zeros_like(s)
+    circle = (0.02 * (np.cos(a) - 1.0), 0.02 * np.sin(a), zero)
+    sinusoid = (0.25 * s, 0.01 * np.sin(2.0 * a), zero)
+    spiral = (0.01 * (np.cos(6.0 * a) - 1.0), 0.01 * np.sin(6.0 * a), 0.05 * s)
+    return [np.column_stack(points) for points in (circle, sinusoid, spiral)]
+
+
+def _screen(target: Array, rng: np.random.Generator, count: int, keep: int) -> Array:
+    """Random homes (keep, 6) [rad] whose averages are nearest, on a coarse path and inside the limits."""
+    q = rng.uniform(-1.0, 1.0, (count, 6)) * (_LIMITS_RAD - 0.1)
+    J, _ = kinematics(q)
+    mu = np.sqrt(np.maximum(np.linalg.det(np.einsum("nji,njk->nik", J, J)), 0.0))
+    q = q[(mu > 0.8 * target[:3].min()) & (mu < 1.1 * target[:3].max())]
+    found, margin = averages(q, 40)
+    worst = np.abs(found / target - 1.0).max(axis=1)
+    worst[~(margin > MARGIN_RAD) | ~np.isfinite(worst)] = np.inf
+    kept: Array = q[np.argsort(worst)[:keep]]
+    return kept
+
+
+def refine(q: Array, target: Array, steps: int, rounds: int) -> Array:
+    """Levenberg-Marquardt from many homes (n, 6) [rad] at once, sorted by what is left."""
+    damping = np.full(len(q), 1e-3)
+    cost, residual = _cost(q, target, steps)
+    for _ in range(rounds):
+        slope = _slope(q, target, steps, residual)
+        normal = np.einsum("nki,nkj->nij", slope, slope) + damping[:, None, None] * np.eye(6)
+        step = -np.linalg.solve(normal, np.einsum("nki,nk->ni", slope, residual)[..., None])[..., 0]
+        step *= np.minimum(1.0, 0.3 / np.maximum(np.linalg.norm(step, axis=1, keepdims=True), 1e-9))
+        tried, left = _cost(q + step, target, steps)
+        better = tried < cost
+        q = np.where(better[:, None], q + step, q)
+        residual = np.where(better[:, None], left, residual)
+        cost = np.where(better, tried, cost)
+        damping = np.clip(np.where(better, 0.3 * damping, 5.0 * damping), 1e-8, 1e3)
+    return q[np.argsort(cost)]
+
+
+def _cost(q: Array, target: Array, steps: int) -> tuple[Array, Array]:
+    """Squared relative residuals with a penalty near the joint limits (n,), and the residuals (n, 6)."""
+    found, margin = averages(q, steps)
+    residual = found / target - 1.0
+    cost = (residual**2).sum(axis=1) + 100.0 * np.maximum(0.0, MARGIN_RAD - margin) ** 2
+    return np.where(np.isfinite(cost), cost, np.inf), residual
+
+
+def _slope(q: Array, target: Array, steps: int, residual: Array) -> Array:
+    """Derivatives of the residuals by the joints (n, 6, 6), forward differences."""
+    width = 1e-5
+    moved, _ = averages(np.concatenate([q + width * axis for axis in np.eye(6)]), steps)
+    ends = (moved / target - 1.0).reshape(6, len(q), 6)
+    return np.asarray(np.moveaxis(ends - residual, 0, 2) / width)

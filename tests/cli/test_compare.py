@@ -1,0 +1,159 @@
+"""`surgsim compare` as a user types it."""
+
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from surgsim.cli.main import main
+from surgsim.compare.table import read_table
+
+SUITE = """\
+name: tiny
+scenarios: [circle_lwr4plus]
+controllers: [pinv, vprnn]
+seeds: "0:2"
+settings:
+  - theatre=false
+  - task.duration_s=0.2
+  - task.ramp_s=0.1
+  - task.hold_start_s=0
+  - task.hold_end_s=0
+  - task.radius_m=0.002
+  - "disturbances=[{type: payload, spread: 0.5}]"
+"""
+RUN_LINE = r"tiny: 4 of 4 runs, 0 failed, about 0 s to go"
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    made = tmp_path_factory.mktemp("compare")
+    (made / "tiny.yaml").write_text(SUITE)
+    return made
+
+
+@pytest.fixture(scope="module")
+def surgsim(folder):
+    def run(*words):
+        command = [sys.executable, "-W", "error", "-m", "surgsim", *words]
+        environment = {**os.environ, "NO_COLOR": "1"}
+        return subprocess.run(
+            command, cwd=folder, env=environment, capture_output=True, text=True, timeout=200
+        )
+
+    return run
+
+
+@pytest.fixture(scope="module")
+def done(surgsim):
+    """A finished comparison, in runs/suites/tiny."""
+    return surgsim("compare", "tiny.yaml", "--jobs", "2")
+
+
+def test_it_ends_with_a_leaderboard(done, folder):
+    assert done.returncode == 0, done.stderr
+    assert "pinv" in done.stdout
+    assert "vprnn" in done.stdout
+    assert "rcm_error_rms_mm" in done.stdout
+    out = folder / "runs" / "suites" / "tiny"
+    assert sorted(path.name for path in out.iterdir()) == ["runs", "runs.csv", "runs.parquet", "suite.json"]
+    table = read_table(out)
+    assert table["outcome"].to_pylist() == ["completed"] * 4
+    about = json.loads((out / "suite.json").read_text())
+    assert about["command"] == "surgsim compare tiny.yaml --jobs 2"
+
+
+def test_progress_and_what_was_written_are_on_stderr(done):
+    lines = done.stderr.splitlines()
+    assert re.fullmatch(RUN_LINE, lines[-3])
+    assert lines[-2:] == [
+        "4 runs; wrote runs/suites/tiny/runs.parquet and runs.csv",
+        "surgsim report runs/suites/tiny  makes the page",
+    ]
+
+
+def test_results_that_are_there_are_kept_unless_resumed(surgsim, done, folder, capsys, monkeypatch):
+    monkeypatch.chdir(folder)
+    assert main(["compare", "tiny.yaml"]) == 2
+    assert capsys.readouterr() == (
+        "",
+        "surgsim: runs/suites/tiny holds results; give --resume to go on with them, or another --out\n",
+    )
+    assert main(["compare", "tiny.yaml", "--resume", "--json", "--metric", "tip_error_rms_mm"]) == 0
+    out, error = capsys.readouterr()
+    assert "0 failed" not in error, "nothing was run again"
+    rows = json.loads(out)
+    assert [(row["runs"], row["completed"]) for row in rows] == [(2, 2), (2, 2)]
+    assert {row["controller"] for row in rows} == {"pinv", "vprnn"}
+
+
+def test_shards_from_the_command_line(surgsim, folder, done):
+    first = surgsim("compare", "tiny.yaml", "--out", "shards", "--shard", "1/2", "--jobs", "1")
+    assert first.returncode == 1
+    assert (
+        first.stdout
+        == "shards: other shards' runs are missing; --resume makes the table once they are there\n"
+    )
+    second = surgsim("compare", "tiny.yaml", "--out", "shards", "--shard", "2/2", "--jobs", "1")
+    assert second.returncode == 0, second.stderr
+    columns = ["run_id", "outcome", "tip_error_rms_mm", "rcm_error_max_mm"]
+    whole = read_table(folder / "runs" / "suites" / "tiny").select(columns)
+    assert read_table(folder / "shards").select(columns).equals(whole)
+
+
+def test_ctrl_c_ends_the_workers_and_says_how_to_go_on(folder):
+    command = [sys.executable, "-m", "surgsim", "compare", "tiny.yaml", "--out", "broken", "--seeds", "0:50"]
+    with subprocess.Popen(
+        command, cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as process:
+        end = time.monotonic() + 100.0
+        while not list((folder / "broken").glob("runs/*/*/*/metrics.json")):
+            assert time.monotonic() < end, "no run was done"
+            time.sleep(0.02)
+        children = Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()
+        process.send_signal(signal.SIGINT)
+        out, error = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert out == ""
+    assert error.splitlines()[-1] == "surgsim: interrupted; --resume --out broken runs what is missing"
+    assert "Traceback" not in error
+    assert children
+    assert not any(Path(f"/proc/{pid}").exists() for pid in children)
+
+
+WRONG = {
+    "suite and scenario": (["quick", "circle_lwr4plus"], "give one suite, or scenarios; not both"),
+    "neither": (["nonsense"], "'nonsense' is not a shipped scenario. Known: circle_lwr4plus, "),
+    "no file": (["nothing.yaml"], "nothing.yaml: cannot be read: "),
+    "controller": (["quick", "--controllers", "vprn"], "--controller: 'vprn' is not a shipped controller."),
+    "seeds": (["quick", "--seeds", "x"], "--seeds: 'x' is not a list of seeds: write 0:10, 3 or 1,4,9"),
+    "jobs": (["quick", "--jobs", "0"], "--jobs: 0 is not allowed: must be 1 or more"),
+    "shard": (["quick", "--shard", "4/3"], "--shard: '4/3' is not I/N with 1 <= I <= N"),
+    "shard 0": (["quick", "--shard", "0/3"], "--shard: '0/3' is not I/N with 1 <= I <= N"),
+    "no shard": (["quick", "--shard", "2"], "--shard: '2' is not I/N with 1 <= I <= N"),
+    "metric": (["quick", "--metric", "rcm_error_rms"], "'rcm_error_rms' is not a metric. Known: "),
+    "address": (["quick", "--address", "host:6379"], "--address is for --engine ray"),
+    "foreign out": (
+        ["quick", "--out", "."],
+        ". holds files that are not batch results; choose another --out",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", WRONG)
+def test_what_is_wrong_is_said_before_anything_is_run(capsys, monkeypatch, tmp_path, name):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "other.txt").write_text("")
+    words, text = WRONG[name]
+    assert main(["compare", *words]) == 2
+    out, error = capsys.readouterr()
+    assert out == ""
+    assert error.startswith(f"surgsim: {text}")
+    assert error.count("\n") == 1
+    assert [path.name for path in tmp_path.iterdir()] == ["other.txt"]

@@ -1,0 +1,176 @@
+"""The tidy table: its types, its nulls, the same in both files, and what is said of damaged ones."""
+
+import json
+import math
+
+import pyarrow as pa
+import pyarrow.csv
+import pyarrow.parquet
+import pytest
+
+from surgsim.compare.table import MACHINE_COLUMNS, Row, read_table, schema, write_table
+from surgsim.errors import SurgsimError
+from surgsim.metrics.catalog import METRICS
+
+TEXT = {"run_id", "suite", "scenario", "controller", "parameters", "outcome", "outcome_detail"}
+TEXT |= {"scenario_sha256", "surgsim_version", "commit", "machine", "folder", "recording"}
+
+
+def summary(**changes):
+    made = {
+        "schema_version": 1,
+        "scenario": "circle",
+        "controller": "vprnn",
+        "seed": 3,
+        "outcome": {"name": "completed", "sentence": "", "t_s": 0.1 + 0.2, "detail": "", "data": {}},
+        "metrics": {name: 1.0 / (3 + i) for i, name in enumerate(METRICS)},
+        "provenance": {
+            "surgsim": "1.0",
+            "commit": None,
+            "machine": "Linux x86_64",
+            "scenario_sha256": "ab",
+            "wall_time_s": 0.5,
+        },
+    }
+    return {**made, **changes}
+
+
+@pytest.fixture
+def results(tmp_path):
+    """Writes `metrics.json` files and gives their rows."""
+
+    def write(*summaries):
+        rows = []
+        for i, content in enumerate(summaries):
+            folder = tmp_path / "runs" / str(i)
+            folder.mkdir(parents=True)
+            (folder / "metrics.json").write_text(json.dumps(content))
+            rows.append(
+                Row(run_id=str(i), suite="small", parameters={"b": [1], "a": "x"}, folder=f"runs/{i}")
+            )
+        return rows
+
+    return write
+
+
+FAILED = {"name": "worker_died", "sentence": "", "t_s": 0.0, "detail": 'exit, "code"\n-9', "data": {}}
+
+
+@pytest.fixture
+def table(results, tmp_path):
+    undefined = {**summary()["metrics"], "rcm_error_max_mm": None}
+    return write_table(
+        tmp_path, results(summary(), summary(outcome=FAILED, metrics={}), summary(metrics=undefined))
+    )
+
+
+def test_every_column_has_its_type(table):
+    assert table.schema == schema()
+    types = {field.name: field.type for field in table.schema}
+    assert {name for name, kind in types.items() if kind == pa.string()} == TEXT
+    assert types.pop("seed") == pa.int64()
+    numbers = {name for name, kind in types.items() if kind == pa.float64()}
+    assert numbers == {*METRICS, "outcome_t_s", "wall_time_s"}
+    assert set(MACHINE_COLUMNS) == {
+        "control_time_p50_us",
+        "control_time_p99_us",
+        "deadline_miss_fraction",
+        "wall_time_s",
+    }
+
+
+def test_a_failed_run_is_a_row_without_metrics(table):
+    row = table.to_pylist()[1]
+    assert (row["outcome"], row["outcome_detail"]) == ("worker_died", 'exit, "code"\n-9')
+    assert [row[name] for name in METRICS] == [None] * len(METRICS)
+    assert (row["seed"], row["wall_time_s"]) == (3, 0.5)
+
+
+def test_what_is_not_defined_is_null_and_the_rest_is_exact(table):
+    first, _, last = table.to_pylist()
+    assert {name: first[name] for name in METRICS} == summary()["metrics"]
+    assert last["rcm_error_max_mm"] is None
+    assert first["outcome_t_s"] == 0.1 + 0.2
+    assert first["parameters"] == '{"a": "x", "b": [1]}'
+    assert (first["commit"], first["recording"]) == (None, None)
+
+
+def test_a_recording_is_named_when_it_is_there(results, tmp_path):
+    rows = results(summary(), summary())
+    (tmp_path / "runs" / "1" / "recording.rrd").write_text("")
+    assert write_table(tmp_path, rows)["recording"].to_pylist() == [None, "runs/1/recording.rrd"]
+
+
+def test_both_files_hold_the_same_table(table, tmp_path):
+    assert read_table(tmp_path).equals(table)
+    options = pa.csv.ConvertOptions(
+        column_types=schema(), strings_can_be_null=True, quoted_strings_can_be_null=False
+    )
+    parsing = pa.csv.ParseOptions(newlines_in_values=True)
+    again = pa.csv.read_csv(tmp_path / "runs.csv", convert_options=options, parse_options=parsing)
+    assert again.to_pylist() == table.to_pylist()
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["runs", "runs.csv", "runs.parquet"]
+
+
+def test_numbers_survive_the_csv_bit_for_bit(results, tmp_path):
+    odd = [0.1 + 0.2, 1e-300, 5e-324, 1.7976931348623157e308, 1.0 / 3.0, 123456789.123456789, -0.0]
+    name = next(iter(METRICS))
+    rows = results(*[summary(metrics={name: value}) for value in odd])
+    write_table(tmp_path, rows)
+    back = pa.csv.read_csv(tmp_path / "runs.csv")[name].to_pylist()
+    assert back == odd
+    assert math.copysign(1.0, back[-1]) == -1.0
+
+
+@pytest.mark.parametrize(
+    ("text", "reason"),
+    [
+        ("", "Expecting value"),
+        ('{"scenario": "circle"}', "'outcome'"),
+        ('{"outcome": 1, "provenance": {}}', "'scenario'"),
+        ("[]", "list indices"),
+    ],
+)
+def test_a_damaged_metrics_json_is_named(results, tmp_path, text, reason):
+    rows = results(summary())
+    path = tmp_path / "runs" / "0" / "metrics.json"
+    path.write_text(text)
+    with pytest.raises(SurgsimError) as error:
+        write_table(tmp_path, rows)
+    assert str(error.value).startswith(f"{path} is not a run's metrics.json: ")
+    assert reason in str(error.value)
+
+
+@pytest.mark.parametrize("metrics", [[1, 2], {"tip_error_rms_mm": "large"}])
+def test_metrics_of_the_wrong_kind_are_an_error_too(results, tmp_path, metrics):
+    rows = results(summary(metrics=metrics))
+    with pytest.raises(SurgsimError, match=r"metrics\.json"):
+        write_table(tmp_path, rows)
+
+
+def test_a_folder_without_a_table(tmp_path):
+    with pytest.raises(SurgsimError) as error:
+        read_table(tmp_path)
+    text = f"{tmp_path} holds no runs.parquet: it is no folder of batch results, or not finished"
+    assert str(error.value) == text
+
+
+def test_a_damaged_parquet(table, tmp_path):
+    path = tmp_path / "runs.parquet"
+    path.write_bytes(path.read_bytes()[:-20])
+    with pytest.raises(SurgsimError) as error:
+        read_table(tmp_path)
+    assert str(error.value).startswith(f"{path} is damaged: ")
+    assert "\n" not in str(error.value)
+
+
+def test_a_table_of_something_else(table, tmp_path):
+    path = tmp_path / "runs.parquet"
+    pa.parquet.write_table(table.drop_columns(["seed"]), path)
+    with pytest.raises(SurgsimError) as error:
+        read_table(tmp_path)
+    assert str(error.value) == f"{path} has no column 'seed': it is not a table of this version"
+    pa.parquet.write_table(table.slice(0, 0), path)
+    with pytest.raises(SurgsimError) as error:
+        read_table(tmp_path)
+    assert str(error.value) == f"{path} has no rows"

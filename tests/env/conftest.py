@@ -1,0 +1,34 @@
+"""Short versions of the shipped scenarios, and environments on them."""
+
+from collections.abc import Callable
+
+import pytest
+
+from surgsim.scenario.load import load_scenario, shipped
+from surgsim.scenario.schema import Scenario
+from surgsim.tasks.base import PathTaskConfig
+
+BRIEF = (
+    "theatre=false",
+    "task.duration_s=0.2",
+    "task.ramp_s=0.1",
+    "task.hold_start_s=0",
+    "task.hold_end_s=0",
+)
+
+
+def brief(name: str) -> Scenario:
+    """A shipped scenario with its path in 0.2 s."""
+    whole = load_scenario(name)
+    return load_scenario(name, assignments=BRIEF) if isinstance(whole.task, PathTaskConfig) else whole
+
+
+@pytest.fixture(scope="session")
+def brief_scenario() -> Callable[[str], Scenario]:
+    return brief
+
+
+@pytest.fixture(scope="session", params=shipped())
+def shipped_name(request) -> str:
+    """Every shipped scenario."""
+    return request.param

@@ -1,0 +1,101 @@
+"""The share of the attainable manipulability, against brute force over the swivel curve."""
+
+import numpy as np
+import pytest
+
+from surgsim.control.self_motion import SelfMotion
+from surgsim.metrics.catalog import METRICS
+from surgsim.metrics.optimality import SAMPLES, attainable_manipulability, manipulability_optimality
+from surgsim.scenario.load import load_scenario
+from surgsim.simulate.loop import simulate
+from surgsim.trace.trace import Trace
+
+P_WC = np.array([0.0, 0.55, 0.2])
+P_WT = np.array([0.02, 0.55, 0.02])
+HOME = np.array([1.5708, -0.5236, 0.0, 1.5708, 0.0, -1.0472, 0.0])
+KINEMATIC = "plant={type: kinematic}"
+
+
+@pytest.fixture(scope="module")
+def curve(arm):
+    manifold = SelfMotion(arm, margin_rad=0.0)
+    here = manifold.project(HOME, P_WT, P_WC, steps=30)
+    return manifold.swivel_curve(here.q, P_WT, P_WC, step_rad=0.005)
+
+
+def _run(*changes, q=None, controller="pinv"):
+    start = [] if q is None else [f"start={{q_rad: {q.tolist()}}}"]
+    short = ("theatre=false", "task.duration_s=0.8", "task.ramp_s=0.3", "task.radius_m=0.01")
+    scenario = load_scenario(
+        "circle_lwr4plus", controller=controller, assignments=[*short, KINEMATIC, *start, *changes]
+    )
+    return simulate(scenario)
+
+
+def _held(trace, rows):
+    """A trace that stays in the first row's state."""
+    return Trace(np.repeat(trace.data[:1], rows, axis=0), trace.blocks, trace.meta)
+
+
+@pytest.mark.parametrize("share", [0.1, 0.35, 0.7, 0.95])
+def test_of_a_held_posture_it_is_mu_over_the_largest_of_the_swivel_curve(arm, curve, share):
+    q = curve[round(share * (len(curve) - 1))].q
+    trace = _held(_run("task.radius_m=0.001", q=q), 40)
+    mu = np.array([np.prod(np.linalg.svd(arm.kinematics(p.q).Jv_WT, compute_uv=False)) for p in curve])
+    here = np.prod(np.linalg.svd(arm.kinematics(q).Jv_WT, compute_uv=False))
+    assert manipulability_optimality(trace) == pytest.approx(here / mu.max(), rel=1e-4)
+    _, best = attainable_manipulability(trace)
+    assert np.ptp(best) < 1e-6 * best[0]
+
+
+def test_the_held_optimum_is_one(arm, curve):
+    manifold = SelfMotion(arm, margin_rad=0.0)
+    best = max(curve, key=lambda point: point.mu)
+    top = manifold.climb(best.q, P_WT, P_WC)
+    trace = _held(_run("task.radius_m=0.001", q=top.q), 10)
+    assert manipulability_optimality(trace) == pytest.approx(1.0, abs=1e-6)
+
+
+@pytest.mark.parametrize("controller", ["pinv", "gradient"])
+@pytest.mark.parametrize("trocar", [True, False])
+def test_no_run_is_above_one_anywhere(curve, controller, trocar):
+    """Also at ticks between those where it is sampled by default."""
+    q = curve[len(curve) // 4].q
+    trace = _run(*([] if trocar else ["trocar=null"]), q=q, controller=controller)
+    rows, best = attainable_manipulability(trace, 61)
+    share = trace["manipulability"][rows] / best
+    assert (share <= 1.0 + 1e-6).all()
+    assert share.min() < 0.95
+    assert manipulability_optimality(trace) == pytest.approx(share.mean(), abs=0.01)
+
+
+def test_along_a_path_it_is_the_largest_of_each_tick_s_own_curve(arm, curve):
+    trace = _run(q=curve[len(curve) // 4].q)
+    rows, best = attainable_manipulability(trace, 4)
+    manifold = SelfMotion(arm, margin_rad=0.0)
+    for row, found in zip(rows, best, strict=True):
+        p_WT = trace.block("tip")[row]
+        own = manifold.swivel_curve(trace.block("q")[row], p_WT, P_WC, step_rad=0.01)
+        assert found == pytest.approx(max(point.mu for point in own), rel=1e-3)
+
+
+def test_without_a_trocar_more_is_attainable(curve):
+    q = curve[len(curve) // 4].q
+    with_trocar, without = (
+        attainable_manipulability(_held(_run("task.radius_m=0.001", *changes, q=q), 5))[1][0]
+        for changes in ((), ("trocar=null",))
+    )
+    assert without > 1.01 * with_trocar
+
+
+def test_it_is_sampled_from_the_first_tick_to_the_last():
+    trace = _run()
+    rows, best = attainable_manipulability(trace)
+    assert (rows[0], rows[-1], len(rows)) == (0, len(trace) - 1, SAMPLES)
+    assert best.shape == rows.shape
+    rows, _ = attainable_manipulability(_held(trace, 3))  # shorter than the samples
+    assert rows.tolist() == [0, 1, 2]
+
+
+def test_it_is_a_metric_of_which_more_is_better():
+    assert METRICS["manipulability_optimality"].lower_is_better is False
