@@ -1,13 +1,12 @@
 """Draws `controllers/*.png` and prints the tables of docs/controllers. Names as arguments choose some.
 
-The names: a shipped controller, `frontier` (some minutes), `swivel`, and `table`. `docs/controllers/README.md`
+The names: a shipped controller, `frontier` (some minutes), `swivel`, `table`. `docs/controllers/README.md`
 holds what `table` prints, `rcm_inverse_dynamics.md` what `frontier` prints.
 """
 
 import sys
 from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor
-from functools import partial
 from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
@@ -57,7 +56,7 @@ COLUMNS = ("tip_error_rms_mm", "tip_error_max_mm", "rcm_error_rms_mm", "rcm_erro
 STIFFNESSES = (1e3, 4e3, 1e4, 2e4, 4e4)
 OBSERVER_GAINS = (0.02, 0.3)
 DELAYS_MS = tuple(range(1, 11))
-FAILED_MM = 1.0
+FAILED_MM, STOPPED_MM = 1.0, 50.0
 
 
 def run(controller: str, assignments: Sequence[str]) -> tuple[str, dict[str, Any], dict[str, np.ndarray]]:
@@ -181,30 +180,29 @@ def _print_frontier(worst: dict[tuple[float, float], dict[str, Any]]) -> None:
 
 
 def _draw_frontier(worst: dict[tuple[float, float], dict[str, Any]]) -> None:
-    colors = dict(zip(STIFFNESSES, (GREEN, BLUE, ORANGE, VERMILLION, BLACK), strict=True))
-    marks = dict(zip(STIFFNESSES, "osD^v", strict=True))
-    title = f"rcm_inverse_dynamics on {SCENARIO} with an actuation delay"
-    with figure(OUT / "frontier.png", title, 1, 2, (9.0, 3.9), sharex=True, sharey=True) as axes:
-        for ax, gain in zip(axes.flat, OBSERVER_GAINS, strict=True):
-            for k in STIFFNESSES:
-                for key, line in (("without", "--"), ("with", "-")):
-                    errors = np.minimum(worst[k, gain][key], 60.0)
-                    face = colors[k] if key == "with" else "white"
-                    ax.plot(
-                        DELAYS_MS,
-                        errors,
-                        line + marks[k],
-                        color=colors[k],
-                        markerfacecolor=face,
-                        markersize=5,
-                        linewidth=1.2,
-                        label=f"k_r {k:g} /s², {key} prediction",
-                    )
-            ax.axhline(50.0, color="0.5", linewidth=0.8)
-            ax.set(yscale="log", xlabel="delay [ms]", ylabel="largest RCM error [mm]")
-            ax.set(title=f"observer gain L = {gain:g}", xticks=DELAYS_MS)
-            ax.tick_params(labelleft=True)
-        legend_below(axes, 3)
+    """Left: over the delay, for the last observer gain. Right: under a push, over the stiffness."""
+    colors = (GREEN, BLUE, ORANGE, VERMILLION, BLACK)
+    gain = OBSERVER_GAINS[-1]
+    with figure(OUT / "frontier.png", f"rcm_inverse_dynamics on {SCENARIO}", 1, 2, (9.5, 4.2)) as axes:
+        left, right = axes.flat
+        for k, color, mark in zip(STIFFNESSES, colors, "osD^v", strict=True):
+            for key, line, face in (("without", "--", "white"), ("with", "-", color)):
+                errors = np.array(worst[k, gain][key])
+                style = {"color": color, "markerfacecolor": face, "markersize": 5, "linewidth": 1.2}
+                label = f"k_r = {k:g} /s²" if key == "with" else None
+                left.plot(DELAYS_MS, np.minimum(errors, STOPPED_MM), line + mark, label=label, **style)
+        left.axhline(STOPPED_MM, color="0.5", linewidth=0.8)
+        left.annotate("stopped at a limit", (1.0, 0.6 * STOPPED_MM), va="top", fontsize=9, color="0.3")
+        left.set(yscale="log", ylim=(5e-6, 1e2), xlabel="actuation delay [ms]", xticks=DELAYS_MS)
+        left.set(ylabel="largest RCM error [mm]", title="delay; dashed: without prediction")
+        left.legend(fontsize=9, frameon=False, loc="center right")
+        for observer, color in zip(OBSERVER_GAINS, (PURPLE, BLUE), strict=True):
+            for key, line, what in (("push", "-o", "no delay"), ("push, delay", ":s", "5 ms, predicted")):
+                errors = [worst[k, observer][key] for k in STIFFNESSES]
+                right.plot(STIFFNESSES, errors, line, color=color, label=f"L = {observer:g}, {what}")
+        right.set(xscale="log", yscale="log", ylim=(1e-2, 1e1), xlabel="RCM stiffness k_r [1/s²]")
+        right.set(ylabel="largest RCM error [mm]", title="push of 5 N at the tip")
+        right.legend(fontsize=9, frameon=False, loc="upper right")
 
 
 def swivel() -> None:
@@ -220,21 +218,37 @@ def swivel() -> None:
     best = int(np.argmax(mu))
     limits = setup.arm.limits
     with figure(
-        OUT / "swivel.png", "Manipulability over the elbow swivel, start of sinusoid_lwr4plus", size=(7.0, 3.8)
+        OUT / "swivel.png",
+        "Manipulability over the elbow swivel, start of sinusoid_lwr4plus",
+        size=(7.0, 3.8),
     ) as axes:
         ax = axes[0, 0]
         ax.plot(angle, mu, color=BLUE, linewidth=2.0)
         ax.plot(angle[here], mu[here], "o", color=BLACK, markersize=8, label=f"start, µ = {mu[here]:.4f}")
-        ax.plot(angle[best], mu[best], "*", color=VERMILLION, markersize=15, label=f"largest, µ = {mu[best]:.4f}")
-        for end in (0, -1):
+        ax.plot(
+            angle[best], mu[best], "*", color=VERMILLION, markersize=15, label=f"largest, µ = {mu[best]:.4f}"
+        )
+        for end, side in ((0, "right"), (-1, "left")):
             room = np.minimum(curve[end].q - limits.q_min, limits.q_max - curve[end].q)
-            joint = int(np.argmin(room)) + 1
-            label = f"end: joint {joint} {1e3 * room.min():.0f} mrad from its limit, µ = {mu[end]:.4f}"
-            ax.plot(angle[end], mu[end], "|>"[0], color=PURPLE, markersize=22, markeredgewidth=3, label=label)
+            label = "end: a joint limit" if end == 0 else None
+            ax.plot(angle[end], mu[end], "|", color=PURPLE, markersize=20, markeredgewidth=3, label=label)
+            text = f"joint {int(np.argmin(room)) + 1} at its limit\nµ = {mu[end]:.4f}"
+            ax.annotate(text, (angle[end], mu[end] - 0.03), ha=side, va="top", fontsize=9)
         ax.set(xlabel="elbow swivel [rad], 0 = elbow highest", ylabel="µ [m³]")
         ax.set_ylim(0.0, 1.12 * mu.max())
-        ax.legend(fontsize=9, frameon=False, loc="lower center")
-    print("swivel from", angle[0], "to", angle[-1], "start", angle[here], mu[here], "best", angle[best], mu[best])
+        ax.legend(fontsize=9, frameon=False, loc="lower center", markerscale=0.7)
+    print(
+        "swivel from",
+        angle[0],
+        "to",
+        angle[-1],
+        "start",
+        angle[here],
+        mu[here],
+        "best",
+        angle[best],
+        mu[best],
+    )
 
 
 def main(names: Sequence[str]) -> int:

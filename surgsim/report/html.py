@@ -2,6 +2,7 @@
 
 import html
 import os
+import re
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from urllib.parse import quote
@@ -21,8 +22,9 @@ def breakable(name: str) -> str:
 
 
 def paragraph(text: str, classes: str = "") -> str:
-    """A paragraph of plain text."""
-    return f'<p class="{classes}">{escape(text)}</p>' if classes else f"<p>{escape(text)}</p>"
+    """A paragraph of plain text; what stands between backticks is set as code."""
+    words = re.sub("`([^`]+)`", r"<code>\1</code>", escape(text))
+    return f'<p class="{classes}">{words}</p>' if classes else f"<p>{words}</p>"
 
 
 def section(anchor: str, title: str, *parts: str, level: int = 2) -> str:

@@ -1,9 +1,11 @@
 """`surgsim inspect` with two recordings, and with a batch's folder."""
 
 import json
+import shutil
 from pathlib import Path
 
 import pytest
+from rerun.chunk import RrdReader
 
 from surgsim.cli.main import main
 from surgsim.compare.engine import Batch, compare
@@ -12,6 +14,7 @@ from surgsim.compare.suite import SuiteConfig
 from surgsim.compare.workers import Done
 from surgsim.metrics.catalog import METRICS
 from surgsim.metrics.timing import TIMING_METRICS
+from surgsim.recording.layout import HEADER, SERIES, TIMELINE
 
 SETTINGS = (
     "theatre=false",
@@ -21,7 +24,7 @@ SETTINGS = (
     "task.hold_end_s=0",
     "task.radius_m=0.002",
 )
-A, B = "circle_lwr4plus/pinv/base-seed0", "circle_lwr4plus/vprnn/base-seed0"
+A, B = "circle_lwr4plus/pinv/base-seed0", "circle_lwr4plus/joint_impedance/base-seed0"
 
 
 @pytest.fixture(scope="module")
@@ -31,7 +34,7 @@ def batch(tmp_path_factory) -> Path:
     suite = SuiteConfig(
         name="pair",
         scenarios=("circle_lwr4plus",),
-        controllers=("pinv", "vprnn"),
+        controllers=("pinv", "joint_impedance"),
         record=True,
         settings=SETTINGS,
     )
@@ -55,10 +58,10 @@ def test_two_recordings_are_compared(runs, capsys, monkeypatch, tmp_path):
     out, error = capsys.readouterr()
     assert error == ""
     assert out.splitlines()[0].rstrip() == "circle_lwr4plus"
-    assert out.splitlines()[1].split() == ["metric", "pinv", "vprnn", "difference"]
+    assert out.splitlines()[1].split() == ["metric", "pinv", "joint_impedance", "difference"]
     assert {line.split()[0] for line in out.splitlines()[2 : 2 + len(METRICS)]} == set(METRICS)
     largest = float(out.splitlines()[-1].removeprefix("largest distance between the two tips: ").split()[0])
-    assert 0.0 < largest < 4.0
+    assert 1.0 < largest < 10.0
     assert list(tmp_path.iterdir()) == [], "nothing is written unless asked for"
 
 
@@ -83,23 +86,31 @@ def test_out_writes_both_on_one_timeline(runs, capsys, tmp_path):
     file = tmp_path / "made" / "pair.rrd"
     assert main(["inspect", *runs, "--out", str(file)]) == 0
     assert capsys.readouterr().err == f"wrote {file}\n"
-    paths, timelines = contents(file)
-    for side in "ab":
-        assert any(path.startswith(f"/{side}/") for path in paths)
-    mine = {path.removeprefix("/a") for path in paths if path.startswith("/a/")}
-    other = {path.removeprefix("/b") for path in paths if path.startswith("/b/")}
-    assert mine == other
-    assert timelines == contents(Path(runs[0]) / "recording.rrd")[1]
+    paths, ticks = contents(file)
+    alone = [contents(Path(run) / "recording.rrd") for run in runs]
+    for side, (own_paths, own_ticks) in zip("ab", alone, strict=True):
+        assert len(own_ticks) > 5
+        shown = {
+            f"/{side}{path}"
+            for path in own_paths
+            if not path.startswith((f"/{HEADER}", "/__", "/summary/", "/log"))
+        }
+        assert shown == {path for path in paths if path.startswith(f"/{side}/")}
+        mine = {path: n for path, n in ticks.items() if path.startswith(f"/{side}/")}
+        assert mine == {f"/{side}{path}": n for path, n in own_ticks.items()}
     assert [path.name for path in file.parent.iterdir()] == ["pair.rrd"]
 
 
 def contents(file):
-    """Entity paths and timelines of a recording."""
-    import rerun as rr
-
-    schema = rr.dataframe.load_recording(str(file)).schema()
-    columns = schema.component_columns()
-    return {str(column.entity_path) for column in columns}, {column.name for column in schema.index_columns()}
+    """Entity paths of a recording, and how many points of its one timeline each series has."""
+    paths: set[str] = set()
+    ticks: dict[str, int] = {}
+    for chunk in RrdReader(file).stream():
+        batch = chunk.to_record_batch()
+        paths.add(chunk.entity_path)
+        if TIMELINE in batch.schema.names and f"/{SERIES}/" in f"{chunk.entity_path}/":
+            ticks[chunk.entity_path] = ticks.get(chunk.entity_path, 0) + len(batch)
+    return paths, ticks
 
 
 def test_a_batch_lists_its_runs(batch, capsys):
@@ -129,7 +140,7 @@ def test_a_run_of_two_batches_is_compared(batch, capsys):
 
 def test_what_is_wrong_is_one_line(batch, runs, capsys, tmp_path):
     wrong = {
-        f"'nothing' is not a run of {batch}. Known: {A}, {B}.": [str(batch), "--run", "nothing"],
+        f"'nothing' is not a run of {batch}. Known: {B}, {A}.": [str(batch), "--run", "nothing"],
         "inspect takes one recording, two, or a batch's folder": [*runs, runs[0]],
         "--export takes one recording": [*runs, "--export", str(tmp_path / "x.parquet")],
         f"{runs[0]} holds no runs.parquet: it is no folder of batch results, or not finished": [
@@ -145,8 +156,6 @@ def test_what_is_wrong_is_one_line(batch, runs, capsys, tmp_path):
 
 
 def test_a_run_without_recording_says_so(batch, capsys, tmp_path):
-    import shutil
-
     copy = shutil.copytree(batch, tmp_path / "copy")
     (copy / "runs" / A / "recording.rrd").unlink()
     assert main(["inspect", str(copy), "--run", A]) == 2

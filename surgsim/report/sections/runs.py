@@ -16,15 +16,7 @@ def runs_section(results: Results, page: Path) -> str:
     """The list of runs, folded."""
     shown = results.rows[:MOST_ROWS]
     metrics = results.headline[:2]
-    head = [
-        "run",
-        "seed",
-        "grid point",
-        "outcome",
-        *(html.escape(name) for name in metrics),
-        "folder",
-        "recording",
-    ]
+    head = ["run", "recording", "folder", "outcome", "seed", "grid point", *map(html.escape, metrics)]
     rows = [_row(results, row, metrics, page) for row in shown]
     note = html.paragraph(
         "Open a recording with `surgsim inspect FOLDER --view`. The links are relative: move the page only "
@@ -47,10 +39,10 @@ def _row(results: Results, row: Mapping[str, Any], metrics: list[str], page: Pat
     folder, recording = row["folder"], row["recording"]
     return [
         f"{html.escape(row['scenario'])}<small>{html.escape(row['controller'])}</small>",
+        html.link(results.folder, page, recording, "recording") if recording else "–",
+        html.link(results.folder, page, folder, "folder") if folder else "–",
+        ended,
         html.escape(row["seed"]),
         html.escape(point),
-        ended,
         *(number(row[name]) for name in metrics),
-        html.link(results.folder, page, folder, "folder") if folder else "–",
-        html.link(results.folder, page, recording, "recording") if recording else "–",
     ]

@@ -59,9 +59,9 @@ QUICK = Extent(
     variants=tuple(variant for variant in VARIANTS if variant.quick),
     ladder=(
         ("vprnn", NOMINAL),
-        ("vprnn", Level(payload_kg=1.0)),
+        ("vprnn", PAPER_SIZE),
         ("vprnn", Level(coulomb_nm=1.0)),
-        ("rcm_inverse_dynamics", Level(payload_kg=1.0)),
+        ("rcm_inverse_dynamics", NOMINAL),
     ),
     euler=((1000.0, 1e-3),),
     plants=("kinematic",),

@@ -73,10 +73,11 @@ def _ours_under_disturbance(tables: Tables) -> Claim:
     tip, rcm = (max(numbers(rows, column)) for column in ("tip_max_mm", "rcm_max_mm"))
     return Claim(
         source="surgsim",
-        text="rcm_inverse_dynamics has at most a twentieth of VPRNN's largest tip and RCM error in every cell",
+        text="rcm_inverse_dynamics has at most a twentieth of VPRNN's largest tip and RCM error in "
+        "every cell",
         verdict="holds" if max(shares) <= SHARE else "does not hold",
-        evidence=f"{span([100.0 * x for x in shares], 2)} % of VPRNN's in {len(rows)} cells of the ladder; at most "
-        f"{tip:.3g} mm (tip) and {rcm:.3g} mm (RCM)",
+        evidence=f"{span([100.0 * x for x in shares], 2)} % of VPRNN's in {len(rows)} cells of the ladder; "
+        f"at most {tip:.3g} mm (tip) and {rcm:.3g} mm (RCM)",
     )
 
 
