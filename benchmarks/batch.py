@@ -165,9 +165,7 @@ def main() -> None:
     print_table(f"\n{options.runs} runs of 0.2 s, {cores} workers", ("", "wall", "CPU"), text, (1, 2))
     slope = 1e3 * float(np.polyfit(np.arange(len(late)), late, 1)[0])
     print(f"driver's memory: {late[0]:.1f} MB after a tenth of the runs, {late[-1]:.1f} MB after all;")
-    print(
-        f"largest {late.max():.1f} MB, growth {slope:.2f} MB per 1000 runs; start of a worker {start_cpu_s:.1f} s"
-    )
+    print(f"largest {late.max():.1f} MB, growth {slope:.2f} MB per 1000 runs")
 
     lines = []
     for _ in range(options.pairs):

@@ -237,5 +237,18 @@ def test_every_shipped_suite_can_be_run(name):
     assert suite.name == name
     assert suite.description
     specs = expand(suite, folder)
-    first_seed = parse_seeds(suite.seeds)[0]
-    assert check_runs([spec for spec in specs if spec.seed == first_seed])
+    first = specs[0]
+    every_pair = [spec for spec in specs if (spec.parameters, spec.seed) == (first.parameters, first.seed)]
+    same_pair = [
+        spec for spec in specs if (spec.scenario, spec.controller) == (first.scenario, first.controller)
+    ]
+    assert check_runs([*every_pair, *same_pair])
+
+
+def test_the_full_suite_leaves_nothing_out():
+    suite, folder = load_suite("full")
+    assert sorted(suite.scenarios) == sorted(shipped())
+    assert sorted(suite.controllers) == sorted(shipped("controllers"))
+    assert len(expand(suite, folder)) == 3600
+    assert len(expand(*load_suite("seeds"))) == 480
+    assert len(expand(*load_suite("quick"))) == 36
