@@ -192,10 +192,9 @@ def _draw_frontier(worst: dict[tuple[float, float], dict[str, Any]]) -> None:
                 label = f"k_r = {k:g} /s²" if key == "with" else None
                 left.plot(DELAYS_MS, np.minimum(errors, STOPPED_MM), line + mark, label=label, **style)
         left.axhline(STOPPED_MM, color="0.5", linewidth=0.8)
-        left.annotate("stopped at a limit", (1.0, 0.6 * STOPPED_MM), va="top", fontsize=9, color="0.3")
+        left.annotate("stopped at a limit", (6.4, 0.6 * STOPPED_MM), va="top", fontsize=9, color="0.3")
         left.set(yscale="log", ylim=(5e-6, 1e2), xlabel="actuation delay [ms]", xticks=DELAYS_MS)
         left.set(ylabel="largest RCM error [mm]", title="delay; dashed: without prediction")
-        left.legend(fontsize=9, frameon=False, loc="center right")
         for observer, color in zip(OBSERVER_GAINS, (PURPLE, BLUE), strict=True):
             for key, line, what in (("push", "-o", "no delay"), ("push, delay", ":s", "5 ms, predicted")):
                 errors = [worst[k, observer][key] for k in STIFFNESSES]
@@ -203,6 +202,7 @@ def _draw_frontier(worst: dict[tuple[float, float], dict[str, Any]]) -> None:
         right.set(xscale="log", yscale="log", ylim=(1e-2, 1e1), xlabel="RCM stiffness k_r [1/s²]")
         right.set(ylabel="largest RCM error [mm]", title="push of 5 N at the tip")
         right.legend(fontsize=9, frameon=False, loc="upper right")
+        legend_below(axes, len(STIFFNESSES))
 
 
 def swivel() -> None:
