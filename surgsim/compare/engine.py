@@ -177,5 +177,5 @@ def _clear(out: Path) -> None:
     """Remove what killed runs left half done."""
     for left in [*out.glob("runs/*/*/.*.part"), *out.glob("runs/*/*/.*.old")]:
         shutil.rmtree(left, ignore_errors=True)
-    for left in out.glob(f"{_DRAFT}*.part"):
+    for left in [*out.glob(f"{_DRAFT}*.part"), *out.glob(".runs.*.partial")]:
         left.unlink(missing_ok=True)

@@ -1,7 +1,6 @@
 """The tidy table: one row per run, failures included."""
 
 import json
-import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,6 +13,7 @@ import pyarrow.parquet
 from surgsim.errors import SurgsimError
 from surgsim.metrics.catalog import METRICS
 from surgsim.metrics.timing import TIMING_METRICS
+from surgsim.recording.files import replacing
 
 TEXT_COLUMNS = ("run_id", "suite", "scenario", "controller")
 PARQUET, CSV = "runs.parquet", "runs.csv"
@@ -94,13 +94,9 @@ def write_table(root: Path, rows: Sequence[Row]) -> pa.Table:
         table = pa.Table.from_pylist([read_row(root, row) for row in rows], schema=schema())
     except pa.ArrowException as error:
         raise SurgsimError(f"a metrics.json below {root} holds a value of another type: {error}") from error
-    try:
-        for name, write in ((PARQUET, pa.parquet.write_table), (CSV, pa.csv.write_csv)):
-            draft = root / f".{name}.part"
+    for name, write in ((PARQUET, pa.parquet.write_table), (CSV, pa.csv.write_csv)):
+        with replacing(root / name) as draft:  # two shards may end at the same time
             write(table, draft)
-            os.replace(draft, root / name)
-    except OSError as error:
-        raise SurgsimError(f"cannot write the table in {root}: {error.strerror or error}") from error
     return table
 
 

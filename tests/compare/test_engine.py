@@ -200,6 +200,7 @@ def test_what_a_killed_run_left_is_neither_counted_nor_kept(copy, whole):
     draft = folder.parent / f".{folder.name}.abc.part"
     folder.rename(draft)
     (copy / ".suite.json.x.part").write_text("half")
+    (copy / ".runs.parquet.x.partial").write_text("half")
     runner = Counting()
     table = compare(batch(copy, resume=True), runner=runner)
     assert runner.folders == [str(folder)]
@@ -346,11 +347,11 @@ def test_a_disk_that_is_full_when_the_table_is_written(copy, whole, monkeypatch)
         real(source, target)
 
     with monkeypatch.context() as patch:
-        patch.setattr("surgsim.compare.table.os.replace", refuse)
+        patch.setattr("surgsim.recording.files.os.replace", refuse)
         with pytest.raises(SurgsimError) as error:
             compare(batch(copy, resume=True), runner=here)
-    assert str(error.value) == f"cannot write the table in {copy}: No space left on device"
-    assert not (copy / "runs.parquet").exists()
+    assert str(error.value) == f"{copy / 'runs.parquet'}: cannot be written: No space left on device"
+    assert sorted(path.name for path in copy.iterdir()) == ["runs", "runs.csv", "suite.json"]
     assert same(compare(batch(copy, resume=True), runner=here), read_table(whole))
 
 

@@ -1,5 +1,8 @@
 """Suites: their keys, their runs in order, their errors."""
 
+import re
+from pathlib import Path
+
 import pytest
 
 from surgsim.compare.suite import (
@@ -15,6 +18,7 @@ from surgsim.compare.suite import (
 )
 from surgsim.errors import ScenarioError, SurgsimError
 from surgsim.scenario.load import load_scenario, shipped
+from surgsim.scenario.yaml_text import parse_yaml
 
 MINIMAL = "name: small\nscenarios: [circle_lwr4plus]\n"
 
@@ -252,3 +256,26 @@ def test_the_full_suite_leaves_nothing_out():
     assert len(expand(suite, folder)) == 3600
     assert len(expand(*load_suite("seeds"))) == 480
     assert len(expand(*load_suite("quick"))) == 36
+
+
+def test_every_key_is_documented_with_its_default():
+    page = (Path(__file__).parents[2] / "docs" / "batch.md").read_text()
+    section = page.split("## Suite files")[1].split("\n## ")[0]
+    rows = dict(re.findall(r"^\| `(\w+)` \| .+? \| (.+?) \| .+ \|$", section, re.M))
+    assert list(rows) == list(SuiteConfig.model_fields)
+    for key, field in SuiteConfig.model_fields.items():
+        if field.is_required():
+            assert rows[key] == "required"
+        else:
+            default = field.get_default(call_default_factory=True)
+            shown = list(default) if isinstance(default, tuple) else default
+            assert parse_yaml(f"x: {rows[key].strip('`')}", key).tree["x"] == shown
+
+
+def test_the_suite_of_the_documents_is_valid(write, tmp_path):
+    page = (Path(__file__).parents[2] / "docs" / "batch.md").read_text()
+    text = re.search(r"^```text\n(name: .*?)^```$", page, re.M | re.S)[1]
+    (tmp_path / "my_path.yaml").write_text(shipped()["spiral_lwr4plus"].read_text())
+    own = shipped("controllers")["pinv"].read_text()
+    (tmp_path / "my_controller.yaml").write_text(own)
+    assert len(check_runs(expand(*load_suite(write(text))))) == 2 * 2 * 3 * 2 * 10

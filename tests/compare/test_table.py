@@ -2,6 +2,9 @@
 
 import json
 import math
+import os
+import re
+from pathlib import Path
 
 import pyarrow as pa
 import pyarrow.csv
@@ -174,3 +177,29 @@ def test_a_table_of_something_else(table, tmp_path):
     with pytest.raises(SurgsimError) as error:
         read_table(tmp_path)
     assert str(error.value) == f"{path} has no rows"
+
+
+def test_shards_that_end_at_the_same_time_do_not_disturb_each_other(results, tmp_path, monkeypatch):
+    """The second writes the whole table while the first is between writing its draft and renaming it."""
+    rows, inner = results(summary()), []
+    real = os.replace
+
+    def replace(source, target):
+        if not inner:
+            inner.append(True)
+            write_table(tmp_path, rows)
+        real(source, target)
+
+    monkeypatch.setattr("surgsim.recording.files.os.replace", replace)
+    table = write_table(tmp_path, rows)
+    assert read_table(tmp_path).equals(table)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["runs", "runs.csv", "runs.parquet"]
+
+
+def test_every_column_is_documented():
+    whole = (Path(__file__).parents[2] / "docs" / "batch.md").read_text()
+    page = whole.split("## What a results folder holds")[1]
+    kinds = {pa.string(): "text", pa.int64(): "integer", pa.float64(): "number"}
+    documented = dict(re.findall(r"^\| `(\w+)` \| (text|integer|number) \| .+ \|$", page, re.M))
+    assert documented == {field.name: kinds[field.type] for field in schema() if field.name not in METRICS}
+    assert [name for name in MACHINE_COLUMNS if f"`{name}`" not in whole] == []

@@ -39,8 +39,8 @@ class GradientConfig(PartConfig):
 class Gradient:
     """q' = pinv(J) v + (I - pinv(J) J) k grad(ln mu), projected on Omega.
 
-    The gradient is cut at Omega's velocity limits before it is projected, so that a large k gives a bounded
-    self-motion. Source: Liegeois 1977; the comparison of the VPRNN paper, section IV.
+    The gradient is scaled to the velocity limits as a whole before it is projected, so that a large k gives a
+    bounded self-motion. Source: Liegeois 1977; the comparison of the VPRNN paper, section IV.
     """
 
     def __init__(self, config: GradientConfig) -> None:

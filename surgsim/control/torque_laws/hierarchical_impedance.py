@@ -51,8 +51,8 @@ class HierarchicalImpedance:
     N_i is the dynamically consistent null-space projector: its torque accelerates none of the rows of
     J_i. The bias compensates gravity, Coriolis and centrifugal torque of the nominal model.
 
-    Source: VPRNN paper, section III and Table I; the law itself is the hierarchical operational-space
-    formulation that it cites (Khatib 1987; Sandoval et al. 2017; Su et al. 2019).
+    Source: gains from Table I of the VPRNN paper, which prints no torque law; the law is the hierarchical
+    operational-space formulation that it cites (Khatib 1987; Sandoval et al. 2017; Su et al. 2019).
     """
 
     terms = ("tip", "rcm", "joint", "bias")

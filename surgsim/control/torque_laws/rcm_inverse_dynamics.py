@@ -78,7 +78,7 @@ class RcmInverseDynamics:
     acts on the state predicted with the torques still on their way, which is why stiff gains survive it.
 
     Source: ours; the hierarchy is operational-space control (Khatib 1987), the observer the discrete form of
-    a momentum observer (De Luca et al. 2006), the prediction a Smith predictor.
+    a momentum observer (De Luca et al. 2006), the prediction one of the state over the dead time.
     """
 
     terms = ("tip", "rcm", "joint", "bias", "observer", "limits")
