@@ -92,7 +92,7 @@ def _collect(ray: Any, reference: Any, job: Job) -> str:
         record_failure(job, WORKER_DIED, type(error).__name__)
         return WORKER_DIED
     except ray.exceptions.RayError as error:
-        reason = str(error).strip().splitlines()[-1]
+        reason = str(error).strip().splitlines()[0]
         raise stopped(f"the cluster cannot do the runs: {type(error).__name__}: {reason}") from error
     if kind == "disk":
         raise stopped(f"a node's disk refuses: {text}")
