@@ -1,14 +1,14 @@
-"""Small dense solves through LAPACK: a third of the cost of `numpy.linalg.solve` at these sizes."""
+"""A small dense solve through LAPACK: a third of the cost of `numpy.linalg.solve` at these sizes."""
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg.lapack import dgesv, dposv
+from scipy.linalg.lapack import dgesv
 
 Array = NDArray[np.float64]
 
 
 def solve(A: Array, b: Array) -> Array:
-    """X with A x = b, for a square `A` (n, n) and `b` (n,) or (n, m).
+    """Solution of A x = b, for a square `A` (n, n) and `b` (n,) or (n, m).
 
     Raises:
         numpy.linalg.LinAlgError: If A is exactly singular.
@@ -16,16 +16,4 @@ def solve(A: Array, b: Array) -> Array:
     _, _, x, info = dgesv(A, b)
     if info > 0:
         raise np.linalg.LinAlgError("singular matrix")
-    return np.asarray(x)
-
-
-def solve_positive(A: Array, b: Array) -> Array:
-    """X with A x = b, for a symmetric positive definite `A` (n, n) and `b` (n,) or (n, m).
-
-    Raises:
-        numpy.linalg.LinAlgError: If A is not positive definite.
-    """
-    _, x, info = dposv(A, b)
-    if info > 0:
-        raise np.linalg.LinAlgError("matrix is not positive definite")
     return np.asarray(x)

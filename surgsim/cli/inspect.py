@@ -89,24 +89,21 @@ def _one(path: Path, options: argparse.Namespace) -> int:
 
 
 def _print(trace: "Trace", metrics: Mapping[str, float | None], found: list[str], as_json: bool) -> None:
-    ending = trace.meta.ending
-    scenario = trace.meta.scenario
     if as_json:
+        scenario = trace.meta.scenario
         whole = {
             "scenario": scenario["name"],
             "controller": scenario["controller"]["name"],
             "seed": scenario["seed"],
-            "outcome": ending.to_dict(),
+            "outcome": trace.meta.ending.to_dict(),
             "metrics": dict(metrics),
             "differences": found,
         }
         print(json.dumps(whole, indent=2))
         return
-    from surgsim.cli.output import print_metrics
+    from surgsim.cli.output import print_run
 
-    print_metrics(f"{scenario['name']}, {scenario['controller']['name']}, seed {scenario['seed']}", metrics)
-    detail = f" {ending.detail}." if ending.detail else ""
-    print(f"\n{ending.outcome.name.lower()} at {ending.t_s:.3f} s: {ending.outcome.value}{detail}")
+    print_run(trace, metrics)
     print("metrics computed again from the recording " + ("DIFFER:" if found else "equal those stored in it"))
     for line in found:
         print(f"  {line}")

@@ -16,6 +16,7 @@ from surgsim.simulate.loop import Progress as ProgressCall
 if TYPE_CHECKING:
     from surgsim.compare.intervals import Interval
     from surgsim.compare.leaderboard import LeaderboardRow
+    from surgsim.trace.trace import Trace
 
 
 def format_number(value: float | None, digits: int = 4) -> str:
@@ -51,6 +52,14 @@ def print_metrics(title: str, metrics: Mapping[str, float | None]) -> None:
         for name, value in metrics.items()
     ]
     print_table(title, ("metric", "value", "meaning"), rows, right=(1,))
+
+
+def print_run(trace: "Trace", metrics: Mapping[str, float | None]) -> None:
+    """Print a run's metrics, and how it ended."""
+    scenario, ending = trace.meta.scenario, trace.meta.ending
+    print_metrics(f"{scenario['name']}, {scenario['controller']['name']}, seed {scenario['seed']}", metrics)
+    detail = f" {ending.detail}." if ending.detail else ""
+    print(f"\n{ending.outcome.name.lower()} at {ending.t_s:.3f} s: {ending.outcome.value}{detail}")
 
 
 @contextmanager

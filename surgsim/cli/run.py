@@ -29,7 +29,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def execute(options: argparse.Namespace) -> int:
     """Run the scenario; 0 when it completed."""
-    from surgsim.cli.output import print_metrics, show_progress
+    from surgsim.cli.output import print_run, show_progress
     from surgsim.errors import Outcome
     from surgsim.runs.folder import run_to_folder
     from surgsim.scenario.load import load_scenario
@@ -45,9 +45,7 @@ def execute(options: argparse.Namespace) -> int:
     if options.json:
         print((folder / "metrics.json").read_text(), end="")
     else:
-        print_metrics(f"{scenario.name}, {scenario.controller.name}, seed {scenario.seed}", result.metrics)
-        detail = f" {ending.detail}." if ending.detail else ""
-        print(f"\n{ending.outcome.name.lower()} at {ending.t_s:.3f} s: {ending.outcome.value}{detail}")
+        print_run(result.trace, result.metrics)
     speed = f"{result.wall_time_s:.1f} s, {result.real_time_factor:.1f}x real time"
     print(f"simulated {ending.t_s:.1f} s in {speed}; wrote {folder}", file=sys.stderr)
     return 0 if ending.outcome is Outcome.COMPLETED else 1

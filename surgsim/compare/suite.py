@@ -179,8 +179,6 @@ def check_runs(specs: Sequence[RunSpec]) -> list[Scenario]:
         key = (spec.scenario, spec.controller, json.dumps(spec.parameters), spec.settings)
         if key not in scenarios:
             scenarios[key] = spec.load()
-        elif spec.seed < 0:
-            raise ScenarioError("--seeds", f"{spec.seed} is not allowed: must be 0 or more")
         checked.append(scenarios[key].model_copy(update={"seed": spec.seed}))
     return checked
 

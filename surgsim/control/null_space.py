@@ -9,7 +9,7 @@ Array = NDArray[np.float64]
 
 
 def least_velocity(J: Array, v: Array, qdot_0: Array | None = None) -> Array:
-    """Q' = pinv(J) v + (I - pinv(J) J) q'_0: the solution of J q' = v nearest to `qdot_0` (7,) [rad/s].
+    """The solution of J q' = v nearest to `qdot_0` (7,) [rad/s]: q' = pinv(J) v + (I - pinv(J) J) q'_0.
 
     Raises:
         numpy.linalg.LinAlgError: If J has lost rank.
@@ -23,9 +23,3 @@ _ZERO = np.zeros(7)
 @compiled
 def _nearest(J: Array, v: Array, qdot_0: Array) -> Array:
     return qdot_0 + J.T @ np.linalg.solve(J @ J.T, v - J @ qdot_0)
-
-
-@compiled
-def null_space_projection(J: Array, qdot: Array) -> Array:
-    """(I - pinv(J) J) q' (7,): the part of `qdot` that moves none of the rows of J."""
-    return qdot - J.T @ np.linalg.solve(J @ J.T, J @ qdot)

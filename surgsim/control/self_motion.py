@@ -59,14 +59,14 @@ class SelfMotion:
 
     def project(self, q: Array, p_WT: Array, p_WC: Array | None, steps: int = 8) -> SelfMotionPoint:
         """The point of the manifold near `q` (7,) [rad]: Newton steps of least joint motion."""
+        kin = self._arm.kinematics(q)
+        J, residual = self.rows(kin, p_WT, p_WC)
         for _ in range(steps):
-            kin = self._arm.kinematics(q)
-            J, residual = self.rows(kin, p_WT, p_WC)
             if residual @ residual < 1e-24:
                 break
             q = q - J.T @ np.linalg.solve(J @ J.T, residual)
-        kin = self._arm.kinematics(q)
-        _, residual = self.rows(kin, p_WT, p_WC)
+            kin = self._arm.kinematics(q)
+            J, residual = self.rows(kin, p_WT, p_WC)
         return SelfMotionPoint(
             q=q, miss=float(np.linalg.norm(residual)), mu=manipulability(kin.Jv_WT), kin=kin
         )

@@ -28,8 +28,7 @@ def attainable_manipulability(trace: Trace, samples: int = SAMPLES) -> tuple[Arr
     Returns:
         Row numbers (samples,), and mu* there (samples,).
     """
-    arm = _arm(json.dumps(trace.meta.scenario, sort_keys=True))
-    manifold = SelfMotion(arm, margin_rad=0.0)
+    manifold = SelfMotion(_arm(trace), margin_rad=0.0)
     rows = np.unique(np.linspace(0, len(trace) - 1, samples).astype(int))
     has_trocar = trace.meta.scenario.get("trocar") is not None
     best = np.full(len(rows), np.nan)
@@ -64,11 +63,15 @@ def _distinct(points: list[SelfMotionPoint], manifold: SelfMotion) -> list[SelfM
     return kept[:4]
 
 
+def _arm(trace: Trace) -> ArmModel:
+    """The nominal arm of a run; the runs of a batch, which differ in seed and controller, share it."""
+    scene = {key: trace.meta.scenario[key] for key in ("robot", "instrument", "trocar", "theatre")}
+    return _arm_of(json.dumps(scene, sort_keys=True))
+
+
 @lru_cache(maxsize=8)
-def _arm(scenario_json: str) -> ArmModel:
-    scenario = json.loads(scenario_json)
-    scene = {key: scenario[key] for key in ("robot", "instrument", "trocar", "theatre")}
-    return ArmModel(SceneConfig.model_validate_json(json.dumps(scene)))
+def _arm_of(scene_json: str) -> ArmModel:
+    return ArmModel(SceneConfig.model_validate_json(scene_json))
 
 
 METRICS = (

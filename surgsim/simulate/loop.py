@@ -103,7 +103,7 @@ class Simulation:
         truth = setup.plant.truth()
         self._ending = self._safety.check(state, truth, command)
         if self.ended:
-            self._rows.add_stopped(state, truth, command)
+            self._rows.add(state, truth, command)
             return
         began = perf_counter()
         try:
@@ -112,7 +112,7 @@ class Simulation:
             self._ending = Ending(
                 outcome=failure.outcome, t_s=state.t_s, detail=failure.detail, data=failure.data
             )
-            self._rows.add_stopped(state, truth, command)
+            self._rows.add(state, truth, command)
             return
         took = perf_counter() - began
         self._record(state, truth, command, output, took)
@@ -182,7 +182,7 @@ class _Rows:
         self._count = 0
 
     def add(self, state: State, truth: Truth, command: TipCommand) -> Array:
-        """Begin the next row with what is known of every tick."""
+        """Begin the next row with what is known of every tick, also of one that ends the run."""
         at = self.at
         row: Array = self._data[self._count]
         self._count += 1
@@ -194,10 +194,6 @@ class _Rows:
         row[at["wrist"]] = truth.p_WR
         row[at["trocar"]] = truth.p_WC
         return row
-
-    def add_stopped(self, state: State, truth: Truth, command: TipCommand) -> None:
-        """The row of the tick at which a run is stopped: a state, no command."""
-        self.add(state, truth, command)
 
     def finish(self, meta: TraceMeta, setup: Setup) -> Trace:
         """The rows written so far with the derived columns, as a trace."""

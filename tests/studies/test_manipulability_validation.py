@@ -19,36 +19,23 @@ from surgsim.studies.manipulability_validation.setup import (
     prepared,
     scenario,
 )
-from surgsim.studies.study import read_csv
 
 RESULTS = Path(__file__).resolve().parents[2] / "results" / "manipulability_validation"
 CELLS = [(path, home) for path in paper.PATHS for home in paper.HOMES]
 
 
-def numbers(row):
-    """A row read from CSV with its numbers as numbers."""
-
-    def value(text):
-        try:
-            return float(text) if text else None
-        except ValueError:
-            return text
-
-    return {name: value(text) for name, text in row.items()}
-
-
 @pytest.fixture(scope="module")
-def committed():
+def committed(read_numbers):
     names = ("table_4", "table_4_increase", "table_5", "attainable", "variants", "printed_network", "homes")
-    return {name: [numbers(row) for row in read_csv(RESULTS / f"{name}.csv")] for name in names}
+    return {name: read_numbers(RESULTS / f"{name}.csv") for name in names}
 
 
 @pytest.fixture(scope="module")
-def remade(tmp_path_factory):
+def remade(tmp_path_factory, read_numbers):
     """Tables of two cells, made now."""
     out = tmp_path_factory.mktemp("quick")
     study.run(out, True, lambda line: None)
-    return {path.stem: [numbers(row) for row in read_csv(path)] for path in out.glob("*.csv")}
+    return {path.stem: read_numbers(path) for path in out.glob("*.csv")}
 
 
 def by_cell(rows):
@@ -227,11 +214,11 @@ def test_the_committed_folder_is_whole_and_small():
 
 
 @pytest.mark.slow
-def test_everything_made_again_gives_the_committed_tables(tmp_path, committed):
+def test_everything_made_again_gives_the_committed_tables(tmp_path, committed, read_numbers):
     result = study.run(tmp_path, False, lambda line: None)
     assert sorted(path.name for path in tmp_path.iterdir()) == sorted(result.files)
     assert {path.name for path in RESULTS.iterdir()} == set(result.files)
     for name, rows in committed.items():
-        again = [numbers(row) for row in read_csv(tmp_path / f"{name}.csv")]
+        again = read_numbers(tmp_path / f"{name}.csv")
         for row, stored in zip(again, rows, strict=True):
             assert_same(row, stored, 1e-4)

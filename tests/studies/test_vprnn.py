@@ -8,7 +8,6 @@ import pytest
 
 from surgsim.control.resolvers.vprnn import Vprnn
 from surgsim.studies import STUDIES, load_study, vprnn
-from surgsim.studies.study import read_csv
 from surgsim.studies.vprnn import comparison, network, starts
 from surgsim.studies.vprnn.cases import METHODS, NOMINAL, PAPER_SIZE, Level, scenario
 from surgsim.studies.vprnn.claims import paper_claims
@@ -31,21 +30,9 @@ NOISE_STARTED = {"grows_from_s": 0.05, "above_its_start_s": 0.02, "end_s": 0.02,
 """Times [s] at which rounding errors have grown, which differ a little between machines."""
 
 
-def numbers(row):
-    """A row read from CSV with its numbers as numbers and its empty cells as None."""
-
-    def value(text):
-        try:
-            return float(text) if text else None
-        except ValueError:
-            return text
-
-    return {name: value(text) for name, text in row.items()}
-
-
 @pytest.fixture(scope="module")
-def committed():
-    return {name: [numbers(row) for row in read_csv(RESULTS / f"{name}.csv")] for name in TABLES}
+def committed(read_numbers):
+    return {name: read_numbers(RESULTS / f"{name}.csv") for name in TABLES}
 
 
 @pytest.fixture(scope="module")
@@ -263,12 +250,12 @@ def test_the_command_knows_the_study():
 
 
 @pytest.mark.slow
-def test_everything_made_again_gives_the_committed_tables(tmp_path, committed):
+def test_everything_made_again_gives_the_committed_tables(tmp_path, committed, read_numbers):
     result = vprnn.run(tmp_path, False, lambda line: None)
     assert sorted(path.name for path in tmp_path.iterdir()) == sorted(result.files)
     assert {path.name for path in RESULTS.iterdir()} == set(result.files)
     for name, rows in committed.items():
-        again = [numbers(row) for row in read_csv(tmp_path / f"{name}.csv")]
+        again = read_numbers(tmp_path / f"{name}.csv")
         for row, other in zip(again, rows, strict=True):
             assert_same(row, other, 1e-4)
 

@@ -173,7 +173,7 @@ class Vprnn:
         return self._c.beta * _capped_exponential_integral(t_s, t_s + dt_s, self._c.exponent_cap)
 
     def recover_qdot(self, t: Terms, rhs: Array) -> Array:
-        """Q' (7,) of W z = rhs through the block structure of W.
+        """Joint velocity q' (7,) of W z = rhs through the block structure of W.
 
         Raises:
             numpy.linalg.LinAlgError: If W is singular and the rows are `normal`.

@@ -140,7 +140,7 @@ def theorem_table(at: Instant, seeds: Iterable[int]) -> list[Row]:
 
 
 def vprnn_velocities(at: Instant, seed: int, steps: int) -> Array:
-    """Q' (steps + 1, 7) [rad/s] of the network from a random z(0), a row a control period."""
+    """Joint velocity q' (steps + 1, 7) [rad/s] of the network from a random z(0), a row a control period."""
     net = Vprnn(at.vprnn)
     terms = net.terms(at.problem)
     _, l = net.system(terms)  # noqa: E741 - the paper's name
