@@ -26,7 +26,8 @@ from surgsim.compare.suite import SuiteConfig, check_runs, expand
 from surgsim.compare.workers import Done, run_jobs
 from surgsim.metrics.catalog import METRICS
 from surgsim.runs.folder import RunResult, write_run
-from surgsim.simulate.loop import simulate
+from surgsim.simulate.loop import Simulation
+from surgsim.simulate.setup import prepare
 
 SHORT = (
     "theatre=false",
@@ -59,7 +60,8 @@ def parts_ms(runs: int, folder: Path) -> list[tuple[str, float]]:
         return result
 
     for i, scenario in enumerate(check_runs(expand(suite(runs, 0.2), Path()))):
-        trace = timed("simulation", lambda s=scenario: simulate(s))
+        setup = timed("simulation: building the models", lambda s=scenario: prepare(s))
+        trace = timed("simulation: its ticks", lambda s=setup: Simulation(s).run())
         values = {
             name: timed(
                 name if name == "manipulability_optimality" else "other metrics",
@@ -145,7 +147,7 @@ def main() -> None:
         shutil.rmtree(folder)
     print_table("CPU time of a 0.2 s run", ("part", "median [ms]"), [(n, f"{t:.1f}") for n, t in parts], (1,))
     metrics_ms = sum(t for name, t in parts if name in METRICS or name == "other metrics")
-    simulation_ms = dict(parts)["simulation"]
+    simulation_ms = sum(t for name, t in parts if name.startswith("simulation"))
 
     small, batch = Measured(2 * cores, 0.2, cores), Measured(options.runs, 0.2, cores)
     run_cpu_s = (batch.workers_cpu_s - small.workers_cpu_s) / (options.runs - 2 * cores)
@@ -158,6 +160,7 @@ def main() -> None:
         ("a worker, per run [ms]", wall, cpu),
         ("of it the simulation [ms]", batch.simulation_ms, simulation_ms),
         ("beside the simulation [ms]", wall - batch.simulation_ms, cpu - simulation_ms),
+        ("beside the ticks alone [ms]", None, cpu - dict(parts)["simulation: its ticks"]),
         ("beside simulation and metrics [ms]", None, cpu - simulation_ms - metrics_ms),
         ("driver, per run [ms]", batch.driver_ms, own_ms),
     ]
@@ -168,6 +171,8 @@ def main() -> None:
     print(f"largest {late.max():.1f} MB, growth {slope:.2f} MB per 1000 runs")
 
     lines = []
+    if not options.pairs:
+        return
     for _ in range(options.pairs):
         pair = [Measured(16 * n, 2.0, n) for n in (1, 2)]
         cpus = [(m.workers_cpu_s - n * start_cpu_s) / (16 * n) for n, m in zip((1, 2), pair, strict=True)]

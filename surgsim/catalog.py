@@ -2,16 +2,20 @@
 
 A part is one file with a frozen config and the part itself; a catalog holds the name and the place of
 each config, so that names can be listed without importing anything. Other packages add parts through
-entry points of the catalog's group.
+entry points of the catalog's group. One of those that does not load must not stop the rest: a stand-in takes
+its place, which refuses every scenario that names it.
 """
 
 import importlib
+import multiprocessing
+import re
+import sys
 from dataclasses import dataclass, field
 from functools import cached_property
 from importlib.metadata import entry_points
-from typing import Annotated, Any, Union
+from typing import Annotated, Any, ClassVar, Literal, Union, get_args
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, create_model, model_validator
 
 from surgsim.errors import SurgsimError, unknown_name
 
@@ -20,6 +24,16 @@ class PartConfig(BaseModel):
     """Base of every config: frozen, strict, unknown keys refused."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
+
+
+def _check_name(name: str) -> str:
+    if not re.fullmatch(r"[a-z0-9][a-z0-9_]{0,63}", name):
+        raise ValueError(f"'{name}' must be lower-case letters, digits and underscores, at most 64")
+    return name
+
+
+Name = Annotated[str, AfterValidator(_check_name)]
+"""A name that is safe as a file's: of a scenario, a controller, a suite."""
 
 
 @dataclass(frozen=True)
@@ -35,6 +49,7 @@ class Catalog:
     kind: str
     group: str
     places: dict[str, str] = field(default_factory=dict)
+    _stand_ins: dict[str, type[PartConfig]] = field(default_factory=dict, init=False, repr=False)
 
     @cached_property
     def _all(self) -> dict[str, str]:
@@ -49,26 +64,78 @@ class Catalog:
         """Config class of the part `name`.
 
         Raises:
-            SurgsimError: If there is none, or a foreign part does not load.
+            SurgsimError: If there is none, or it does not load.
         """
         if name not in self._all:
             raise SurgsimError(unknown_name(name, self.kind, self._all))
         module, _, attribute = self._all[name].partition(":")
         try:
             found = getattr(importlib.import_module(module), attribute)
-        except (ImportError, AttributeError) as error:
-            raise SurgsimError(f"{self.kind} '{name}' does not load: {error}") from error
+        except Exception as error:
+            if name in self.places and not isinstance(error, ImportError | AttributeError):
+                raise  # a bug of ours
+            raise SurgsimError(f"{self.kind} '{name}' does not load: {_told(error)}") from error
         if not (isinstance(found, type) and issubclass(found, PartConfig)):
             raise SurgsimError(f"{self.kind} '{name}' ({self._all[name]}) is not a PartConfig class")
         return found
 
+    def usable(self, name: str) -> type[PartConfig]:
+        """Config class of the part `name`, or a stand-in for a foreign one that does not load.
+
+        The first time, standard error says what does not load.
+
+        Raises:
+            SurgsimError: If there is none, or one of ours does not load.
+        """
+        if name in self.places:
+            return self.config(name)
+        if name not in self._stand_ins:
+            try:
+                return _checked(self.config(name), self.kind, name)
+            except SurgsimError as error:
+                self._stand_ins[name] = _stand_in(name, str(error))
+                if multiprocessing.parent_process() is None:  # workers need not say it again
+                    print(f"surgsim: {error}; no scenario can name it", file=sys.stderr)
+        return self._stand_ins[name]
+
     def summary(self, name: str) -> str:
-        """First line of the part's docstring."""
-        return (self.config(name).__doc__ or "").strip().split("\n")[0]
+        """First line of the part's docstring, or why it does not load."""
+        return (self.usable(name).__doc__ or "").strip().split("\n")[0]
 
     def union(self) -> Any:
         """The pydantic type 'any part of this catalog', told apart by its `type` key and titled by kind."""
-        classes = tuple(self.config(name) for name in self.names())
+        classes = tuple(self.usable(name) for name in self.names())
         if len(classes) == 1:
             return Annotated[classes[0], Field(title=self.kind)]
         return Annotated[Union[classes], Field(discriminator="type", title=self.kind)]  # noqa: UP007
+
+
+def _checked(config: type[PartConfig], kind: str, name: str) -> type[PartConfig]:
+    """`config`, if its `type` is `name`: the union of a catalog's parts tells them apart by it."""
+    key = config.model_fields.get("type")
+    if key is None or get_args(key.annotation) != (name,):
+        raise SurgsimError(f"{kind} '{name}' ({config.__qualname__}) needs the field type: Literal['{name}']")
+    return config
+
+
+class _DoesNotLoad(PartConfig):
+    reason: ClassVar[str]
+
+    @model_validator(mode="before")
+    @classmethod
+    def _refuse(cls, data: Any) -> Any:
+        raise ValueError(cls.reason)
+
+
+def _stand_in(name: str, reason: str) -> type[PartConfig]:
+    """A config of the type `name` that refuses everything with `reason`."""
+    key: Any = (Literal.__getitem__(name), name)
+    config = create_model("DoesNotLoad", __base__=_DoesNotLoad, __doc__=f"{reason}.", type=key)
+    config.reason = reason
+    return config
+
+
+def _told(error: Exception) -> str:
+    """What went wrong, on one line."""
+    text = " ".join(str(error).split())
+    return text if isinstance(error, ImportError | AttributeError) else f"{type(error).__name__}: {text}"

@@ -38,8 +38,9 @@ class RecordingError(SurgsimError):
 def unknown_name(name: str, kind: str, known: Iterable[str]) -> str:
     """Say that `name` is not a `kind`, list what is, and suggest the nearest match."""
     names = sorted(known)
-    text = f"'{name}' is not a {kind}. Known: {', '.join(names) or 'none'}."
-    near = difflib.get_close_matches(name, names, n=1)
+    shown = name if len(name) <= 60 else f"{name[:57]}..."
+    text = f"'{shown}' is not a {kind}. Known: {', '.join(names) or 'none'}."
+    near = difflib.get_close_matches(shown, names, n=1)
     return f"{text} Did you mean '{near[0]}'?" if near else text
 
 
@@ -52,4 +53,8 @@ class Outcome(enum.Enum):
     VELOCITY_LIMIT = "A joint moved faster than its velocity limit."
     RCM_LIMIT = "The shaft moved further from the trocar than the incision allows."
     TIP_LIMIT = "The tip left its path by more than the stated limit."
+    SELF_COLLISION = "The arm or its instrument touched the arm."
+    PATIENT_COLLISION = "The arm or its instrument touched the patient or the table."
+    INCISION_TORN = "The shaft pressed on the abdominal wall harder than the incision bears."
+    FORCE_LIMIT = "A force on trocar or tip passed its limit."
     INFEASIBLE = "The controller found no command that meets its hard constraints."

@@ -1,9 +1,15 @@
+import os
 import re
+import subprocess
+import sys
+from types import SimpleNamespace
 
 import pytest
+from pydantic import TypeAdapter, ValidationError
 
-from surgsim.catalog import Catalog
+from surgsim.catalog import Catalog, Name
 from surgsim.errors import SurgsimError
+from surgsim.scenario.load import load_scenario
 from surgsim.tasks import TASKS
 from surgsim.tasks.circle import CircleConfig
 
@@ -46,6 +52,95 @@ def test_parts_of_other_packages_come_from_entry_points_and_cannot_hide_ours(mon
     assert catalog.names() == ["part", "theirs"]
     assert catalog.config("theirs") is CircleConfig
     assert catalog.config("part").__name__ == "SpiralConfig"
+
+
+@pytest.fixture
+def foreign(monkeypatch):
+    """A catalog with one part of ours and foreign ones at the given places."""
+
+    def make(**places):
+        points = [SimpleNamespace(name=name, value=value) for name, value in places.items()]
+        monkeypatch.setattr("surgsim.catalog.entry_points", lambda group: points)
+        return Catalog("widget", "a group", {"circle": "surgsim.tasks.circle:CircleConfig"})
+
+    return make
+
+
+BROKEN = {
+    "no module": ("nowhere_at_all:Config", "No module named 'nowhere_at_all'"),
+    "no class": ("surgsim.tasks.circle:Nothing", "has no attribute 'Nothing'"),
+    "an error while it is imported": ("broken_part:Config", "ZeroDivisionError: division by zero"),
+    "no config": ("math:pi", "widget 'theirs' (math:pi) is not a PartConfig class"),
+    "another type": ("surgsim.tasks.circle:CircleConfig", "needs the field type: Literal['theirs']"),
+}
+
+
+@pytest.mark.parametrize("name", BROKEN)
+def test_a_foreign_part_that_does_not_load_stops_only_what_names_it(
+    foreign, tmp_path, monkeypatch, capsys, name
+):
+    (tmp_path / "broken_part.py").write_text("1 / 0\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    place, reason = BROKEN[name]
+    catalog = foreign(theirs=place)
+    adapter = TypeAdapter(catalog.union())
+    for _ in range(2):
+        assert catalog.names() == ["circle", "theirs"]
+        assert reason in catalog.summary("theirs")
+    out, error = capsys.readouterr()
+    assert out == ""
+    assert error.startswith("surgsim: widget 'theirs' ")
+    assert error.endswith("; no scenario can name it\n")
+    assert error.count("\n") == 1, "it is said once"
+    assert reason in error
+    assert adapter.validate_python({"type": "circle"}) == CircleConfig()
+    with pytest.raises(ValidationError) as refused:
+        adapter.validate_python({"type": "theirs", "gain": 3.0})
+    assert refused.value.error_count() == 1
+    assert reason in str(refused.value)
+
+
+def test_one_of_ours_that_does_not_load_is_an_error():
+    with pytest.raises(SurgsimError, match="widget 'part' does not load"):
+        _catalog("surgsim.nowhere:Config").union()
+
+
+def test_a_scenario_that_names_a_broken_part_is_refused_and_others_run(tmp_path):
+    """In a process of its own, with a package whose entry point leads nowhere."""
+    package = tmp_path / "theirs-1.0.dist-info"
+    package.mkdir()
+    (package / "METADATA").write_text("Metadata-Version: 2.1\nName: theirs\nVersion: 1.0\n")
+    (package / "entry_points.txt").write_text("[surgsim.resolvers]\nbroken = nowhere_at_all:Config\n")
+    paths = os.pathsep.join([str(tmp_path), *sys.path])
+
+    def check(*words):
+        command = [sys.executable, "-W", "error", "-m", "surgsim", "check", "--quiet", *words]
+        environment = {**os.environ, "PYTHONPATH": paths}
+        return subprocess.run(command, env=environment, capture_output=True, text=True, timeout=100)
+
+    reason = "surgsim: resolver 'broken' does not load: No module named 'nowhere_at_all'"
+    fine = check("circle_lwr4plus")
+    assert (fine.returncode, fine.stderr) == (0, f"{reason}; no scenario can name it\n")
+    setting = "controller.resolver={type: broken, gain: 3}"
+    refused = check("circle_lwr4plus", "--set", setting)
+    assert refused.returncode == 2
+    assert refused.stderr.splitlines() == [
+        f"{reason}; no scenario can name it",
+        f"surgsim: --set {setting}: controller.resolver: {reason.removeprefix('surgsim: ')}",
+    ]
+
+
+@pytest.mark.parametrize("name", ["../x", "a/b", "", "A", "a b", "x" * 65, "_x", ".x"])
+def test_a_name_that_is_no_safe_file_name_is_refused(name):
+    with pytest.raises(
+        ValidationError, match="must be lower-case letters, digits and underscores, at most 64"
+    ):
+        TypeAdapter(Name).validate_python(name)
+
+
+def test_a_controller_cannot_leave_the_results_folder():
+    with pytest.raises(SurgsimError, match=re.escape("controller.name: '../x' must be lower-case letters")):
+        load_scenario("circle_lwr4plus", assignments=["controller.name=../x"])
 
 
 def test_summary_is_the_first_line_of_the_docstring():

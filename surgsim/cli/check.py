@@ -1,9 +1,8 @@
 """`surgsim check`."""
 
 import argparse
-import sys
 
-from surgsim.cli.scenario_options import add_scenario_options
+from surgsim.cli.scenario_options import add_scenario_options, naming_file
 
 HELP = "check scenarios and print them with every default"
 EXAMPLES = """Checks everything short of running: the file, the start configuration, and that the path can be
@@ -25,6 +24,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def execute(options: argparse.Namespace) -> int:
     """Check every scenario; 2 if any is wrong."""
+    from surgsim.cli.main import print_error
     from surgsim.errors import SurgsimError
     from surgsim.scenario.load import load_scenario
     from surgsim.scenario.yaml_text import dump_yaml
@@ -38,7 +38,7 @@ def execute(options: argparse.Namespace) -> int:
             )
             setup = prepare(scenario)
         except SurgsimError as error:
-            print(f"surgsim: {error}", file=sys.stderr)
+            print_error(naming_file(name, error))
             wrong += 1
             continue
         if not options.quiet:

@@ -2,11 +2,15 @@
 
 import argparse
 import os
+import re
 import shlex
 import sys
 from contextlib import redirect_stdout
 from pathlib import Path
 
+from surgsim.cli.paths import path_argument
+
+MOST_SHARDS = 10_000
 HELP = "run a suite of scenarios and controllers, and compare them"
 EXAMPLES = """A suite is a YAML file of scenarios, controllers, a grid of parameters and seeds; scenarios can
 be given instead. Every finished run is written at once. After an interruption --resume runs what is
@@ -28,7 +32,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--jobs", type=int, metavar="N", help="worker processes; default: the cores")
     parser.add_argument("--engine", choices=("local", "ray"), default="local", help="where runs are done")
     parser.add_argument("--address", metavar="HOST:PORT", help="the ray cluster's address")
-    parser.add_argument("--out", type=Path, metavar="DIR", help="folder of the results")
+    parser.add_argument("--out", type=path_argument, metavar="DIR", help="folder of the results")
     parser.add_argument("--resume", action="store_true", help="keep what is whole, run what is missing")
     parser.add_argument("--shard", metavar="I/N", default="1/1", help="only every Nth run, from the Ith")
     parser.add_argument("--record", action="store_true", help="write a recording of every run")
@@ -88,7 +92,10 @@ def _suite(options: argparse.Namespace):  # type: ignore[no-untyped-def]
     from surgsim.compare.suite import ad_hoc_suite, is_suite, load_suite, with_changes
     from surgsim.errors import SurgsimError
 
-    names, controllers = options.names, options.controllers.split(",") if options.controllers else None
+    names, controllers = (
+        options.names,
+        None if options.controllers is None else options.controllers.split(","),
+    )
     if is_suite(names[0]):
         if len(names) > 1:
             raise SurgsimError("give one suite, or scenarios; not both")
@@ -111,10 +118,11 @@ def _jobs(jobs: int | None) -> int:
 def _shard(text: str) -> tuple[int, int]:
     from surgsim.errors import SurgsimError
 
-    i, slash, n = text.partition("/")
-    if not (slash and i.isdigit() and n.isdigit() and 1 <= int(i) <= int(n) <= 10_000):
-        raise SurgsimError(f"--shard: '{text}' is not I/N with 1 <= I <= N")
-    return int(i), int(n)
+    found = re.fullmatch(r"([0-9]{1,5})/([0-9]{1,5})", text)
+    i, n = (int(found[1]), int(found[2])) if found else (0, 0)
+    if not 1 <= i <= n <= MOST_SHARDS:
+        raise SurgsimError(f"--shard: '{text[:60]}' is not I/N with 1 <= I <= N <= {MOST_SHARDS}")
+    return i, n
 
 
 def _runner(options: argparse.Namespace):  # type: ignore[no-untyped-def]

@@ -2,10 +2,14 @@
 
 import argparse
 import json
+import math
+import shlex
 import sys
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
+
+from surgsim.cli.paths import path_argument
 
 if TYPE_CHECKING:
     from surgsim.recording.read import Recorded
@@ -28,14 +32,22 @@ examples:
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
     parser.add_argument(
-        "paths", type=Path, nargs="+", metavar="FILE.rrd|DIR", help="a recording, a run's or a batch's folder"
+        "paths",
+        type=path_argument,
+        nargs="+",
+        metavar="FILE.rrd|DIR",
+        help="a recording, a run's or a batch's folder",
     )
     shown = parser.add_mutually_exclusive_group()
     shown.add_argument("--view", action="store_true", help="open the viewer")
     shown.add_argument("--web", action="store_true", help="serve the viewer on 127.0.0.1 for a browser")
     parser.add_argument("--run", metavar="RUN_ID", help="which run of a batch's folder")
-    parser.add_argument("--out", type=Path, metavar="FILE.rrd", help="where two runs' recording is kept")
-    parser.add_argument("--export", type=Path, metavar="FILE.parquet|.csv", help="write every control tick")
+    parser.add_argument(
+        "--out", type=path_argument, metavar="FILE.rrd", help="where two runs' recording is kept"
+    )
+    parser.add_argument(
+        "--export", type=path_argument, metavar="FILE.parquet|.csv", help="write every control tick"
+    )
     parser.add_argument("--json", action="store_true", help="print JSON instead of a table")
 
 
@@ -43,6 +55,8 @@ def execute(options: argparse.Namespace) -> int:
     """Print what was asked for; 1 if metrics differ from those stored, or a run did not complete."""
     from surgsim.errors import SurgsimError
 
+    for path in options.paths:
+        _check_finished(path)
     paths = [_run_of(path, options.run) if options.run else path for path in options.paths]
     if len(paths) == 1 and (paths[0] / "runs.parquet").is_file():
         return _list_batch(paths[0], options)
@@ -51,6 +65,34 @@ def execute(options: argparse.Namespace) -> int:
     if len(paths) > 2:
         raise SurgsimError("inspect takes one recording, two, or a batch's folder")
     return _one(paths[0], options)
+
+
+def _check_finished(path: Path) -> None:
+    """Refuse the folder of a batch whose table is not there yet.
+
+    Raises:
+        SurgsimError: If it is one, with the command that goes on with it.
+    """
+    from surgsim.errors import SurgsimError
+
+    if (path / "suite.json").is_file() and not (path / "runs.parquet").is_file():
+        runs = len(list(path.glob("runs/*/*/*/metrics.json")))
+        raise SurgsimError(
+            f"{path}: the batch is not finished: {runs} run{'' if runs == 1 else 's'} there, no table yet. "
+            f"To go on: {_command_again(path, '--resume')}"
+        )
+
+
+def _command_again(path: Path, *flags: str) -> str:
+    """The command line of the batch in `path`, with `flags`."""
+    from surgsim.recording.sealed import read_sealed
+
+    try:
+        words = shlex.split(str(read_sealed(path / "suite.json")["command"]))
+    except (OSError, ValueError, KeyError):
+        words = []
+    words = words or ["surgsim", "compare", "SUITE", "--out", str(path)]
+    return shlex.join([*words, *(flag for flag in flags if flag not in words)])
 
 
 def _run_of(path: Path, run_id: str) -> Path:
@@ -62,18 +104,26 @@ def _run_of(path: Path, run_id: str) -> Path:
     if run_id not in folders:
         known = list(folders)[:20]
         raise SurgsimError(unknown_name(run_id, f"run of {path}", known))
-    folder: str = folders[run_id]
-    return path / folder
+    folder: Path = path / folders[run_id]
+    if not (folder / "recording.rrd").is_file():
+        again = _command_again(path, "--resume", "--record")
+        raise SurgsimError(
+            f"{run_id} was not recorded. To record every run: {again}. "
+            f"To record this one: surgsim run {shlex.quote(str(folder / 'scenario.yaml'))} --out DIR"
+        )
+    return folder
 
 
 def _one(path: Path, options: argparse.Namespace) -> int:
     from surgsim.errors import Outcome
     from surgsim.metrics.catalog import compute_metrics
     from surgsim.recording import view
-    from surgsim.recording.export import export
+    from surgsim.recording.export import check_export, export
     from surgsim.recording.read import read_recording
     from surgsim.recording.stored import differences
 
+    if options.export:
+        check_export(options.export)
     recorded = read_recording(path)
     metrics = compute_metrics(recorded.trace)
     found = differences(recorded.metrics, metrics)
@@ -147,9 +197,17 @@ def _print_difference(pair: "list[Recorded]", as_json: bool) -> None:
     ]
     scenarios = {recorded.trace.meta.scenario["name"] for recorded in pair}
     print_table(" and ".join(sorted(scenarios)), ("metric", *names, "difference"), rows, right=(1, 2, 3))
-    ticks = min(len(recorded.trace) for recorded in pair)
-    gap = pair[0].trace.block("tip")[:ticks] - pair[1].trace.block("tip")[:ticks]
-    print(f"\nlargest distance between the two tips: {1e3 * float((gap**2).sum(axis=1).max() ** 0.5):.4f} mm")
+    largest = format_number(_largest_gap_mm(pair[0].trace, pair[1].trace))
+    print(f"\nlargest distance between the two tips: {largest} mm")
+
+
+def _largest_gap_mm(a: "Trace", b: "Trace") -> float | None:
+    """Largest distance of the tips [mm], over the ticks that both have and where both are finite."""
+    ticks = min(len(a), len(b))
+    gap = a.block("tip")[:ticks] - b.block("tip")[:ticks]
+    distances = (math.hypot(*row) for row in gap.tolist())
+    found = max((d for d in distances if math.isfinite(d)), default=None)
+    return None if found is None else 1e3 * found
 
 
 def _list_batch(path: Path, options: argparse.Namespace) -> int:
@@ -162,6 +220,9 @@ def _list_batch(path: Path, options: argparse.Namespace) -> int:
         return 0
     shown = ("tip_error_rms_mm", "rcm_error_rms_mm", "rcm_error_max_mm")
     table = [(row["run_id"], row["outcome"], *(format_number(row[name]) for name in shown)) for row in rows]
-    print_table(f"{len(rows)} runs of {path}", ("run", "outcome", *shown), table, right=(2, 3, 4))
-    print("\nsurgsim inspect DIR --run RUN opens one")
+    print_table(f"{len(rows)} runs of {path}", ("run", "outcome", *shown), table, right=(2, 3, 4), whole=True)
+    if any(row["recording"] for row in rows):
+        print(f"\nsurgsim inspect {shlex.quote(str(path))} --run RUN opens one")
+    else:
+        print(f"\nnone was recorded; to record them: {_command_again(path, '--resume', '--record')}")
     return 0

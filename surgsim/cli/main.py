@@ -14,6 +14,7 @@ from surgsim import __version__
 from surgsim.errors import SurgsimError
 
 COMMANDS = ("run", "check", "list", "compare", "report", "inspect", "reproduce", "bench")
+_LONGEST_ERROR = 1000
 _EPILOG = """examples:
   surgsim run circle_lwr4plus                      run a shipped scenario, write its folder below runs/
   surgsim run my.yaml --set task.radius_m=0.03     run your own, with one value changed
@@ -48,13 +49,20 @@ def build_parser() -> argparse.ArgumentParser:
     return parser
 
 
+def print_error(error: SurgsimError) -> None:
+    """Print what the user can mend on one line of stderr, whatever the names in it."""
+    from surgsim.scenario.wording import one_line
+
+    print(f"surgsim: {one_line(str(error), _LONGEST_ERROR)}", file=sys.stderr)
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command and return its exit status."""
-    options = build_parser().parse_args(arguments)
     try:
+        options = build_parser().parse_args(arguments)
         return int(options.execute(options))
     except SurgsimError as error:
-        print(f"surgsim: {error}", file=sys.stderr)
+        print_error(error)
         return 2
     except KeyboardInterrupt:
         print("surgsim: interrupted, nothing was written", file=sys.stderr)

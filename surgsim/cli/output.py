@@ -30,17 +30,29 @@ def format_number(value: float | None, digits: int = 4) -> str:
     return f"{value:.{digits - 1}e}"
 
 
+_ENOUGH = 10_000  # columns
+
+
 def print_table(
-    title: str, header: Sequence[str], rows: Sequence[Sequence[str]], right: Sequence[int] = ()
+    title: str,
+    header: Sequence[str],
+    rows: Sequence[Sequence[str]],
+    right: Sequence[int] = (),
+    *,
+    whole: bool = False,
 ) -> None:
-    """Print a table; the columns in `right` are right-aligned."""
+    """Print a table, the columns in `right` right-aligned; a `whole` one may be wider than the terminal."""
     table = Table(title=title, title_justify="left", box=None, pad_edge=False, header_style="bold")
     for index, name in enumerate(header):
-        table.add_column(name, justify="right" if index in right else "left", no_wrap=index in right)
+        table.add_column(name, justify="right" if index in right else "left", no_wrap=whole or index in right)
     for row in rows:
         table.add_row(*row)
     width = None if sys.stdout.isatty() else 110
-    Console(width=width, highlight=False).print(table)
+    console = Console(width=width, highlight=False)
+    if whole:
+        needed = Console(width=_ENOUGH).measure(table).maximum
+        console = Console(width=max(console.width, needed), highlight=False)
+    console.print(table)
 
 
 def print_metrics(title: str, metrics: Mapping[str, float | None]) -> None:

@@ -1,7 +1,8 @@
 """`surgsim report`."""
 
 import argparse
-from pathlib import Path
+
+from surgsim.cli.paths import path_argument
 
 HELP = "write one HTML page about a batch"
 EXAMPLES = """The page needs nothing but itself: it opens from disk, offline, on a phone and in print. Its
@@ -15,8 +16,10 @@ examples:
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
-    parser.add_argument("folder", type=Path, metavar="DIR", help="results folder of surgsim compare")
-    parser.add_argument("--out", type=Path, metavar="FILE", help="file to write; default DIR/report.html")
+    parser.add_argument("folder", type=path_argument, metavar="DIR", help="results folder of surgsim compare")
+    parser.add_argument(
+        "--out", type=path_argument, metavar="FILE", help="file to write; default DIR/report.html"
+    )
     parser.add_argument("--json", action="store_true", help="print JSON")
 
 

@@ -5,6 +5,8 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from surgsim.cli.paths import path_argument
+
 if TYPE_CHECKING:
     from surgsim.studies.study import StudyResult
 
@@ -26,7 +28,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("study", metavar="STUDY", help=", ".join(sorted(STUDIES)))
     parser.add_argument(
         "--out",
-        type=Path,
+        type=path_argument,
         metavar="DIR",
         help="the result folder, by default results/STUDY; replaced if it exists",
     )

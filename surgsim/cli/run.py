@@ -1,11 +1,14 @@
 """`surgsim run`."""
 
 import argparse
+import itertools
 import sys
 from pathlib import Path
 
-from surgsim.cli.scenario_options import add_scenario_options
+from surgsim.cli.paths import path_argument
+from surgsim.cli.scenario_options import add_scenario_options, naming_file
 
+_LIVE = ("keyboard", "gamepad")
 HELP = "run a scenario and write its folder"
 EXAMPLES = """The folder holds scenario.yaml (every default explicit; running it again gives the same trace),
 metrics.json and recording.rrd. It appears when the run is whole.
@@ -14,6 +17,7 @@ examples:
   surgsim run circle_lwr4plus
   surgsim run circle_lwr4plus --controller vprnn --seed 3 --out runs/mine
   surgsim run circle_lwr4plus --set task.radius_m=0.03 --set trocar.position_m='[0, 0.55, 0.2]'
+  surgsim run peg_and_ring_panda --operator keyboard
   surgsim run my_scenario.yaml --json | jq .metrics.rcm_error_max_mm
 """
 
@@ -22,7 +26,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
     parser.add_argument("scenario", metavar="SCENARIO", help="a YAML file or the name of a shipped scenario")
     add_scenario_options(parser)
-    parser.add_argument("--out", type=Path, metavar="DIR", help="the run's folder")
+    parser.add_argument("--out", type=path_argument, metavar="DIR", help="the run's folder")
+    parser.add_argument(
+        "--operator",
+        metavar="keyboard|gamepad|FILE.csv",
+        help="operate a teleoperation yourself, in a window; or play an operator_input.csv again",
+    )
     parser.add_argument("--no-record", action="store_true", help="write no recording.rrd")
     parser.add_argument("--json", action="store_true", help="print metrics.json instead of a table")
 
@@ -30,17 +39,26 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def execute(options: argparse.Namespace) -> int:
     """Run the scenario; 0 when it completed."""
     from surgsim.cli.output import print_run, show_progress
-    from surgsim.errors import Outcome
+    from surgsim.errors import Outcome, UnreachableError
     from surgsim.runs.folder import run_to_folder
     from surgsim.scenario.load import load_scenario
 
     scenario = load_scenario(
         options.scenario, controller=options.controller, assignments=options.assignments, seed=options.seed
     )
-    default = Path("runs") / scenario.name / f"{scenario.controller.name}-seed{scenario.seed}"
-    folder = options.out or default
-    with show_progress(f"{scenario.name} {scenario.controller.name}") as progress:
-        result = run_to_folder(scenario, folder, record=not options.no_record, progress=progress)
+    operator, record = options.operator, not options.no_record
+    name = f"{scenario.controller.name}-seed{scenario.seed}"
+    folder = options.out or _default_folder(Path("runs") / scenario.name, name, operator)
+    with show_progress(f"{scenario.name} {scenario.controller.name}", operator in _LIVE) as progress:
+        try:
+            if operator is None:
+                result = run_to_folder(scenario, folder, record=record, progress=progress)
+            else:
+                from surgsim.live.operate import operate
+
+                result = operate(scenario, operator, folder, record=record, progress=progress)
+        except UnreachableError as error:
+            raise naming_file(options.scenario, error) from error
     ending = result.trace.meta.ending
     if options.json:
         print((folder / "metrics.json").read_text(), end="")
@@ -49,3 +67,12 @@ def execute(options: argparse.Namespace) -> int:
     speed = f"{result.wall_time_s:.1f} s, {result.real_time_factor:.1f}x real time"
     print(f"simulated {ending.t_s:.1f} s in {speed}; wrote {folder}", file=sys.stderr)
     return 0 if ending.outcome is Outcome.COMPLETED else 1
+
+
+def _default_folder(parent: Path, name: str, operator: str | None) -> Path:
+    """Where a run goes; one that a person operated gets a number, so that it never replaces another."""
+    if operator is None:
+        return parent / name
+    kind = operator if operator in _LIVE else "replay"
+    numbered = (parent / f"{name}-{kind}{number}" for number in itertools.count(1))
+    return next(folder for folder in numbered if not folder.exists())

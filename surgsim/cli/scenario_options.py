@@ -2,6 +2,8 @@
 
 import argparse
 
+from surgsim.errors import ScenarioError, SurgsimError
+
 
 def add_scenario_options(parser: argparse.ArgumentParser) -> None:
     """`--controller`, `--set` and `--seed`."""
@@ -15,3 +17,10 @@ def add_scenario_options(parser: argparse.ArgumentParser) -> None:
         help="change one value; may be given again",
     )
     parser.add_argument("--seed", type=int, metavar="N", help="seed instead of the scenario's own")
+
+
+def naming_file(name: str, error: SurgsimError) -> SurgsimError:
+    """`error` with the scenario as it was given, where it names only what the scenario calls itself."""
+    if isinstance(error, ScenarioError) or str(error).startswith(f"{name}: "):
+        return error
+    return type(error)(f"{name}: {error}")

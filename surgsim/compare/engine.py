@@ -12,11 +12,13 @@ from typing import Any
 
 import pyarrow as pa
 
+from surgsim.compare.axis import AxisConfig
 from surgsim.compare.job import Job
 from surgsim.compare.suite import RunSpec, SuiteConfig, check_runs, expand
 from surgsim.compare.table import Row, write_table
 from surgsim.compare.workers import Done, run_jobs
 from surgsim.errors import SurgsimError
+from surgsim.recording.sealed import read_sealed, sealed
 from surgsim.runs.provenance import provenance
 from surgsim.scenario.schema import Scenario
 
@@ -91,7 +93,7 @@ def is_whole(folder: Path, scenario: Scenario, record: bool, code: Code | None =
     With `code`, the run must also have been made by it.
     """
     try:
-        summary = json.loads((folder / "metrics.json").read_text())
+        summary = read_sealed(folder / "metrics.json")
         same = code is None or _code(summary["provenance"]) == code
         same = same and summary["provenance"]["scenario_sha256"] == scenario.sha256()
         recorded = not record or not summary["metrics"] or (folder / "recording.rrd").is_file()
@@ -135,6 +137,8 @@ def _prepare(batch: Batch) -> None:
         "scenarios": list(batch.suite.scenarios),
         "controllers": list(batch.suite.controllers or ()),
         "grid": {key: list(values) for key, values in batch.suite.grid.items()},
+        "axes": _plain(batch.suite.axes),
+        "sweeps": _plain(batch.suite.sweeps),
         "seeds": batch.suite.seeds,
         "settings": list(batch.suite.settings),
     }
@@ -144,7 +148,7 @@ def _prepare(batch: Batch) -> None:
             _check_old(batch, about)
         if batch.shard[1] == 1:  # other shards may be writing now
             _clear(out)
-        whole = {**about, "command": batch.command, "provenance": provenance()}
+        whole = sealed({**about, "command": batch.command, "provenance": provenance()})
         handle, draft = tempfile.mkstemp(prefix=_DRAFT, suffix=".part", dir=out)
         with os.fdopen(handle, "w") as stream:
             stream.write(json.dumps(whole, indent=2) + "\n")
@@ -152,6 +156,10 @@ def _prepare(batch: Batch) -> None:
         os.replace(draft, file)
     except OSError as error:
         raise SurgsimError(f"cannot write {out}: {error.strerror or error}") from error
+
+
+def _plain(axes: Mapping[str, AxisConfig]) -> dict[str, Any]:
+    return {name: json.loads(axis.model_dump_json()) for name, axis in axes.items()}
 
 
 _DRAFT = ".suite.json."
@@ -165,9 +173,9 @@ def _check_old(batch: Batch, about: Mapping[str, Any]) -> None:
     if not batch.resume and batch.shard == (1, 1):
         raise SurgsimError(f"{out} holds results; give --resume to go on with them, or another --out")
     try:
-        old = json.loads((out / "suite.json").read_text())
+        old = read_sealed(out / "suite.json")
         same = {key: old.get(key) for key in about} == about
-    except (ValueError, AttributeError) as error:
+    except ValueError as error:
         raise SurgsimError(f"{out / 'suite.json'} is damaged: {error}") from error
     if not same:
         raise SurgsimError(f"{out} holds the results of another suite, or of other settings")

@@ -4,7 +4,7 @@ import traceback
 from dataclasses import dataclass
 from pathlib import Path
 
-from surgsim.errors import SurgsimError
+from surgsim.errors import Outcome, SurgsimError
 from surgsim.runs.folder import execute, summary_of, whole_folder, write_run, write_summary
 from surgsim.scenario.schema import Scenario
 
@@ -92,3 +92,5 @@ _SENTENCES = {
     WORKER_DIED: "The process that ran it died at every try.",
     CRASHED: "The run raised an error inside surgsim: a bug.",
 }
+OUTCOMES = frozenset({*(outcome.name.lower() for outcome in Outcome), *_SENTENCES})
+"""Every way in which a run of a batch can end."""

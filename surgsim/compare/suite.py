@@ -7,14 +7,15 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Self
 
-from pydantic import AfterValidator, Field
+from pydantic import AfterValidator, Field, model_validator
 
-from surgsim.catalog import PartConfig
+from surgsim.catalog import Name, PartConfig
+from surgsim.compare.axis import AxisConfig, Values
 from surgsim.errors import ScenarioError, SurgsimError
 from surgsim.scenario.load import find, load_scenario, shipped
-from surgsim.scenario.schema import Name, Scenario
+from surgsim.scenario.schema import Scenario
 from surgsim.scenario.validate import validate
 from surgsim.scenario.yaml_text import read_yaml
 
@@ -28,15 +29,16 @@ def parse_seeds(text: str) -> tuple[int, ...]:
         ValueError: If the text is none of these, or names no seed.
     """
     seeds: list[int] = []
+    shown = text if len(text) <= 60 else f"{text[:57]}..."
     for part in text.split(","):
-        match = re.fullmatch(r"\s*(\d{1,9})(?::(\d{1,9}))?\s*", part)
+        match = re.fullmatch(r"\s*([0-9]{1,9})(?::([0-9]{1,9}))?\s*", part)
         if not match:
-            raise ValueError(f"'{text}' is not a list of seeds: write 0:10, 3 or 1,4,9")
+            raise ValueError(f"'{shown}' is not a list of seeds: write 0:10, 3 or 1,4,9")
         first = int(match[1])
         last = int(match[2]) if match[2] else first + 1
         seeds.extend(range(first, min(last, first + MOST_RUNS + 1)))  # one too many is refused below
     if not seeds or len(set(seeds)) != len(seeds) or len(seeds) > MOST_RUNS:
-        raise ValueError(f"'{text}' must name between one and {MOST_RUNS} different seeds")
+        raise ValueError(f"'{shown}' must name between one and {MOST_RUNS} different seeds")
     return tuple(seeds)
 
 
@@ -54,6 +56,8 @@ class SuiteConfig(PartConfig):
         scenarios: Shipped names, or paths from the suite's file.
         controllers: Shipped names, or paths from the suite's file; null: each scenario's own.
         grid: Key paths of the scenario with the values each takes; every combination is run.
+        axes: Named quantities whose levels are combined as those of the grid are.
+        sweeps: Named quantities that are varied one at a time, beside a run with none of them.
         seeds: `0:10`, `3` or `1,4,9`.
         record: Whether every run writes its recording.
         settings: `key.path=value` settings of every run.
@@ -63,10 +67,31 @@ class SuiteConfig(PartConfig):
     description: str = ""
     scenarios: Annotated[tuple[str, ...], Field(min_length=1)]
     controllers: Annotated[tuple[str, ...], Field(min_length=1)] | None = None
-    grid: dict[str, Annotated[tuple[Any, ...], Field(min_length=1)]] = Field(default_factory=dict)
+    grid: dict[str, Values] = Field(default_factory=dict)
+    axes: dict[Name, AxisConfig] = Field(default_factory=dict)
+    sweeps: dict[Name, AxisConfig] = Field(default_factory=dict)
     seeds: Annotated[str, AfterValidator(_check_seeds)] = "0"
     record: bool = False
     settings: tuple[str, ...] = ()
+
+    @model_validator(mode="after")
+    def _seeds_have_one_place(self) -> Self:
+        """A run's seed is set last: one in the grid or the settings would be passed over."""
+        keys = (*self.grid, *(setting.partition("=")[0] for setting in self.settings))
+        if any(key.strip() == "seed" for key in keys):
+            raise ValueError("seed cannot be in grid or settings: the seeds of a suite are its key seeds")
+        return self
+
+    @model_validator(mode="after")
+    def _axes_are_told_apart(self) -> Self:
+        """A table's parameters are named by key path or axis; both in one name would hide one."""
+        names = [*self.grid, *self.axes, *self.sweeps]
+        if twice := sorted({name for name in names if names.count(name) > 1}):
+            raise ValueError(f"{', '.join(twice)} is named twice among grid, axes and sweeps")
+        for name, axis in (*self.axes.items(), *self.sweeps.items()):
+            if strangers := sorted(set(axis.controllers) - set(self.controllers or ())):
+                raise ValueError(f"{name} names {', '.join(strangers)}, no controller of the suite")
+        return self
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -76,8 +101,9 @@ class RunSpec:
     Attributes:
         scenario: Name or path of the scenario.
         controller: Name or path of the controller, or None for the scenario's own.
-        parameters: This run's point of the grid.
+        parameters: This run's point: key paths of the grid with their values, axes with their levels.
         settings: `key.path=value` settings of every run.
+        assignments: The same of this point.
         seed: Its seed.
         record: Whether it writes its recording.
     """
@@ -86,6 +112,7 @@ class RunSpec:
     controller: str | None
     parameters: tuple[tuple[str, Any], ...]
     settings: tuple[str, ...]
+    assignments: tuple[str, ...]
     seed: int
     record: bool
 
@@ -95,9 +122,9 @@ class RunSpec:
         Raises:
             ScenarioError: If it is not valid.
         """
-        grid = [f"{key}={json.dumps(value)}" for key, value in self.parameters]
+        assignments = (*self.settings, *self.assignments)
         return load_scenario(
-            self.scenario, controller=self.controller, assignments=(*self.settings, *grid), seed=self.seed
+            self.scenario, controller=self.controller, assignments=assignments, seed=self.seed
         )
 
 
@@ -136,26 +163,65 @@ def expand(suite: SuiteConfig, folder: Path) -> list[RunSpec]:
     """Every run of `suite`, in a fixed order.
 
     Raises:
-        SurgsimError: If there are too many.
+        SurgsimError: If there are too many, or an axis says nothing of a controller.
     """
     controllers = suite.controllers or (None,)
     seeds = parse_seeds(suite.seeds)
-    points = math.prod(len(values) for values in suite.grid.values())
-    count = len(suite.scenarios) * len(controllers) * points * len(seeds)
+    for name, axis in (*suite.axes.items(), *suite.sweeps.items()):
+        if silent := axis.sets_nothing_for(controllers):
+            raise SurgsimError(f"suite '{suite.name}': {name} sets nothing for {', '.join(silent)}")
+    count = len(suite.scenarios) * len(controllers) * _count_points(suite) * len(seeds)
     if count > MOST_RUNS:
         raise SurgsimError(f"suite '{suite.name}' has {count} runs; at most {MOST_RUNS} are allowed")
     return [
         RunSpec(
             scenario=_near(scenario, folder),
             controller=None if controller is None else _near(controller, folder),
-            parameters=tuple(zip(suite.grid, point, strict=True)),
+            parameters=point.parameters,
             settings=suite.settings,
+            assignments=point.assignments,
             seed=seed,
             record=suite.record,
         )
-        for scenario, controller, point, seed in itertools.product(
-            suite.scenarios, controllers, itertools.product(*suite.grid.values()), seeds
+        for scenario, controller in itertools.product(suite.scenarios, controllers)
+        for point, seed in itertools.product(_points(suite, controller), seeds)
+    ]
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Point:
+    """A point of grid, axes and sweeps: what the table calls it, and what it sets."""
+
+    parameters: tuple[tuple[str, Any], ...] = ()
+    assignments: tuple[str, ...] = ()
+
+    def __add__(self, other: "_Point") -> "_Point":
+        return _Point(
+            parameters=self.parameters + other.parameters, assignments=self.assignments + other.assignments
         )
+
+
+def _count_points(suite: SuiteConfig) -> int:
+    crossed = [len(values) for values in suite.grid.values()] + [len(a.levels) for a in suite.axes.values()]
+    return math.prod(crossed) * (1 + sum(len(sweep.levels) for sweep in suite.sweeps.values()))
+
+
+def _points(suite: SuiteConfig, controller: str | None) -> list[_Point]:
+    """Every combination of grid and axes, each alone and with every level of every sweep."""
+    factors = [
+        [_Point(parameters=((key, value),), assignments=(f"{key}={json.dumps(value)}",)) for value in values]
+        for key, values in suite.grid.items()
+    ]
+    factors += [_levels(name, axis, controller) for name, axis in suite.axes.items()]
+    sweeps = [point for name, sweep in suite.sweeps.items() for point in _levels(name, sweep, controller)]
+    factors.append([_Point(), *sweeps])
+    return [sum(combination, _Point()) for combination in itertools.product(*factors)]
+
+
+def _levels(name: str, axis: AxisConfig, controller: str | None) -> list[_Point]:
+    return [
+        _Point(parameters=((name, level),), assignments=axis.assignments(place, controller))
+        for place, level in enumerate(axis.levels)
     ]
 
 
@@ -176,7 +242,7 @@ def check_runs(specs: Sequence[RunSpec]) -> list[Scenario]:
     scenarios: dict[tuple[Any, ...], Scenario] = {}
     checked = []
     for spec in specs:
-        key = (spec.scenario, spec.controller, json.dumps(spec.parameters), spec.settings)
+        key = (spec.scenario, spec.controller, spec.assignments, spec.settings)
         if key not in scenarios:
             scenarios[key] = spec.load()
         checked.append(scenarios[key].model_copy(update={"seed": spec.seed}))

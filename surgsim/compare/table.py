@@ -1,5 +1,6 @@
 """The tidy table: one row per run, failures included."""
 
+import hashlib
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -10,13 +11,18 @@ import pyarrow as pa
 import pyarrow.csv
 import pyarrow.parquet
 
-from surgsim.errors import SurgsimError
+from surgsim.compare.job import OUTCOMES
+from surgsim.errors import SurgsimError, unknown_name
 from surgsim.metrics.catalog import METRICS
 from surgsim.metrics.timing import TIMING_METRICS
 from surgsim.recording.files import replacing
+from surgsim.recording.sealed import read_sealed
+from surgsim.runs.folder import SCHEMA_VERSION
+from surgsim.scenario.wording import one_line
 
 TEXT_COLUMNS = ("run_id", "suite", "scenario", "controller")
 PARQUET, CSV = "runs.parquet", "runs.csv"
+_SEAL = b"surgsim.sha256"
 MACHINE_COLUMNS = (*sorted(TIMING_METRICS), "wall_time_s")
 """Columns that measure the machine: they differ between two equal batches."""
 
@@ -58,7 +64,8 @@ def read_row(root: Path, row: Row) -> dict[str, Any]:
     """
     path = root / row.folder / "metrics.json"
     try:
-        summary = json.loads(path.read_text())
+        summary = read_sealed(path)
+        _check_summary(summary)
         outcome, provenance = summary["outcome"], summary["provenance"]
         recording = f"{row.folder}/recording.rrd"
         return {
@@ -90,13 +97,11 @@ def write_table(root: Path, rows: Sequence[Row]) -> pa.Table:
     Raises:
         SurgsimError: If a run is missing or damaged, or the disk refuses.
     """
-    try:
-        table = pa.Table.from_pylist([read_row(root, row) for row in rows], schema=schema())
-    except pa.ArrowException as error:
-        raise SurgsimError(f"a metrics.json below {root} holds a value of another type: {error}") from error
+    parts = [_part(root, row) for row in rows]
+    table = pa.Table.from_batches(parts, schema=schema())
     for name, write in ((PARQUET, pa.parquet.write_table), (CSV, pa.csv.write_csv)):
         with replacing(root / name) as draft:  # two shards may end at the same time
-            write(table, draft)
+            write(sealed_table(table), draft)
     return table
 
 
@@ -110,12 +115,54 @@ def read_table(root: Path) -> pa.Table:
     if not path.is_file():
         raise SurgsimError(f"{root} holds no {PARQUET}: it is no folder of batch results, or not finished")
     try:
-        table = pa.parquet.read_table(path)
-    except (OSError, pa.ArrowException) as error:
-        raise SurgsimError(f"{path} is damaged: {str(error).splitlines()[0]}") from error
+        table = pa.parquet.read_table(path, partitioning=None, page_checksum_verification=True)
+        table.validate(full=True)
+    except (OSError, ValueError, pa.ArrowException) as error:
+        reason = next(iter(str(error).splitlines()), "it cannot be read")
+        raise SurgsimError(f"{path} is damaged: {one_line(reason, 200)}") from error
     missing = [name for name in schema().names if name not in table.column_names]
     if missing:
         raise SurgsimError(f"{path} has no column '{missing[0]}': it is not a table of this version")
+    for field in schema():
+        if (found := table.schema.field(field.name).type) != field.type:
+            raise SurgsimError(f"{path}: column '{field.name}' holds {found}, not {field.type}")
     if table.num_rows == 0:
         raise SurgsimError(f"{path} has no rows")
-    return table
+    if (table.schema.metadata or {}).get(_SEAL) != _digest(table):
+        raise SurgsimError(f"{path} is damaged: it does not hold what `surgsim compare` wrote")
+    return table.replace_schema_metadata(None)
+
+
+def sealed_table(table: pa.Table) -> pa.Table:
+    """`table` with the SHA-256 of its content in the meta data of its schema."""
+    return table.replace_schema_metadata({_SEAL: _digest(table)})
+
+
+def _digest(table: pa.Table) -> bytes:
+    content = [table.schema.remove_metadata().to_string(), table.to_pylist()]
+    return hashlib.sha256(json.dumps(content, default=str).encode()).hexdigest().encode()
+
+
+def _part(root: Path, row: Row) -> pa.RecordBatch:
+    """A run's row as a table of one."""
+    try:
+        return pa.RecordBatch.from_pylist([read_row(root, row)], schema=schema())
+    except (pa.ArrowException, OverflowError) as error:
+        path = root / row.folder / "metrics.json"
+        raise SurgsimError(f"{path} holds a value of another type: {error}") from error
+
+
+def _check_summary(summary: Mapping[str, Any]) -> None:
+    """Refuse what no run of this version writes.
+
+    Raises:
+        ValueError: If there is such a thing.
+    """
+    version, outcome = summary["schema_version"], summary["outcome"]["name"]
+    if version != SCHEMA_VERSION:
+        raise ValueError(f"schema_version {version!r}, but this surgsim reads {SCHEMA_VERSION}")
+    if outcome not in OUTCOMES:
+        raise ValueError(unknown_name(str(outcome), "run's outcome", OUTCOMES))
+    for name, value in summary["metrics"].items():
+        if isinstance(value, bool) or not isinstance(value, int | float | None):
+            raise ValueError(f"{name} is {value!r}, not a number or null")

@@ -7,7 +7,11 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import PositiveFloat
 
-from surgsim.catalog import PartConfig
+from surgsim.catalog import Name, PartConfig
+from surgsim.columns import Block, vector
+from surgsim.control.port_estimators import PORT_ESTIMATORS
+from surgsim.control.port_estimators.base import PortEstimate, PortProblem
+from surgsim.control.port_estimators.measured import MeasuredPort, MeasuredPortConfig
 from surgsim.control.problem import ControlFailure, Resolution, VelocityProblem, velocity_bounds
 from surgsim.control.rcm import Rcm, rcm_kinematics
 from surgsim.control.resolvers import RESOLVERS
@@ -22,6 +26,7 @@ Array = NDArray[np.float64]
 
 AnyResolver: Any = RESOLVERS.union()
 AnyTorqueLaw: Any = TORQUE_LAWS.union()
+AnyPortEstimator: Any = PORT_ESTIMATORS.union()
 
 
 class ControllerConfig(PartConfig):
@@ -31,15 +36,17 @@ class ControllerConfig(PartConfig):
         name: What tables and figures call it.
         resolver: Velocity-level redundancy resolver.
         torque_law: Torque-level law; null is for the kinematic plant, which does not use one.
+        port: Where the controller believes the trocar to be.
         evaluate_at: Where the resolver's kinematics are evaluated: the `measured` joint positions, or the
             integrated `reference`, as a position-controlled arm would.
         position_gain_per_s: alpha of the bounds Omega: how fast a joint may approach its position limit.
     """
 
-    name: str
+    name: Name
     description: str = ""
     resolver: AnyResolver
     torque_law: AnyTorqueLaw | None = None
+    port: AnyPortEstimator = MeasuredPortConfig()
     evaluate_at: Literal["measured", "reference"] = "measured"
     position_gain_per_s: PositiveFloat = 10.0
 
@@ -53,12 +60,14 @@ class ControlOutput:
         terms: Each term of the torque (len(terms), 7) [N m].
         resolution: The resolver's answer.
         q_ref: Joint reference (7,) [rad].
+        values: Values of the controller's own columns (k,).
     """
 
     torque: Array
     terms: Array
     resolution: Resolution
     q_ref: Array
+    values: Array
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -67,6 +76,7 @@ class _Measured:
 
     kin: Kinematics
     dyn: Dynamics | None
+    port: PortEstimate
     rcm: Rcm | None
 
 
@@ -89,6 +99,7 @@ class Controller:
         self._dt = dt_s
         self._has_trocar = has_trocar
         self._resolver = config.resolver.build(arm)
+        self._port: Any = config.port.build(arm)
         self._law: Any = config.torque_law.build(arm) if use_torque_law and config.torque_law else None
         self.reset()
 
@@ -97,6 +108,17 @@ class Controller:
         """Names of the torque law's terms."""
         return tuple(self._law.terms) if self._law else ()
 
+    @property
+    def columns(self) -> tuple[Block, ...]:
+        """What resolver and port estimator add to the trace."""
+        port = (vector("trocar_estimate", "m"),) if self._estimates else ()
+        return (*getattr(self._resolver, "columns", ()), *port)
+
+    @property
+    def _estimates(self) -> bool:
+        """Whether the trocar's place is estimated rather than taken as seen."""
+        return self._has_trocar and not isinstance(self._port, MeasuredPort)
+
     def reset(self) -> None:
         """Forget everything: the next tick is the first."""
         self._started = False
@@ -104,6 +126,7 @@ class Controller:
         self._qdot_ref = np.zeros(7)
         self._resolver_memory: Any = None
         self._law_memory: Any = None
+        self._port_memory: Any = None
 
     def tick(self, state: State, command: TipCommand) -> ControlOutput:
         """Command for the plant's `state`.
@@ -134,7 +157,15 @@ class Controller:
             terms, self._law_memory = self._law.torque(problem, self._law_memory)
         self._started = True
         self._advance_reference(resolution)
-        return ControlOutput(torque=terms.sum(axis=0), terms=terms, resolution=resolution, q_ref=q_ref)
+        return ControlOutput(
+            torque=terms.sum(axis=0),
+            terms=terms,
+            resolution=resolution,
+            q_ref=q_ref,
+            values=np.concatenate((resolution.values, measured.port.p_WC))
+            if self._estimates
+            else resolution.values,
+        )
 
     def _evaluate(self, state: State) -> "_Measured":
         """The nominal model at the measured state, once a tick."""
@@ -142,14 +173,32 @@ class Controller:
             kin, dyn = self._arm.kinematics(state.q), None
         else:
             kin, dyn = self._arm.evaluate(state.q, state.v)
-        return _Measured(kin=kin, dyn=dyn, rcm=self._rcm(kin, state))
+        port = self._estimate_port(state, kin, dyn)
+        return _Measured(kin=kin, dyn=dyn, port=port, rcm=self._rcm(kin, port))
+
+    def _estimate_port(self, state: State, kin: Kinematics, dyn: Dynamics | None) -> PortEstimate:
+        problem = PortProblem(
+            t_s=state.t_s,
+            dt_s=self._dt,
+            v=state.v,
+            tau_measured=state.tau,
+            kin=kin,
+            dyn=dyn,
+            p_WC=state.p_WC,
+            v_WC=state.v_WC,
+        )
+        if not self._started:
+            self._port_memory = self._port.start(problem)
+        estimate: PortEstimate
+        estimate, self._port_memory = self._port.step(problem, self._port_memory)
+        return estimate
 
     def _velocity_problem(self, state: State, command: TipCommand, measured: "_Measured") -> VelocityProblem:
         q, v, kin, rcm = state.q, state.v, measured.kin, measured.rcm
         if self._config.evaluate_at == "reference":
             q, v = self._q_ref, self._qdot_ref
             kin = self._arm.kinematics(q)
-            rcm = self._rcm(kin, state)
+            rcm = self._rcm(kin, measured.port)
         lower, upper = velocity_bounds(q, self._arm.limits, self._config.position_gain_per_s)
         return VelocityProblem(
             t_s=state.t_s,
@@ -159,8 +208,8 @@ class Controller:
             kin=kin,
             command=command,
             rcm=rcm,
-            p_WC=state.p_WC,
-            v_WC=state.v_WC,
+            p_WC=measured.port.p_WC,
+            v_WC=measured.port.v_WC,
             lower=lower,
             upper=upper,
             limits=self._arm.limits,
@@ -180,15 +229,17 @@ class Controller:
             kin=measured.kin,
             dyn=measured.dyn,
             rcm=measured.rcm,
-            p_WC=state.p_WC,
-            v_WC=state.v_WC,
+            p_WC=measured.port.p_WC,
+            v_WC=measured.port.v_WC,
+            a_WC=measured.port.a_WC,
             command=command,
             resolution=resolution,
             q_ref=self._q_ref,
+            f_T=state.f_T,
         )
 
-    def _rcm(self, kin: Kinematics, state: State) -> Rcm | None:
-        return rcm_kinematics(kin, state.p_WC, state.v_WC) if self._has_trocar else None
+    def _rcm(self, kin: Kinematics, port: PortEstimate) -> Rcm | None:
+        return rcm_kinematics(kin, port.p_WC, port.v_WC) if self._has_trocar else None
 
     def _advance_reference(self, resolution: Resolution) -> None:
         self._qdot_ref = resolution.qdot

@@ -1,14 +1,39 @@
 """What the arm's measured torque and motion tell: the disturbance torque, and the actuation delay."""
 
 from dataclasses import dataclass, replace
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from surgsim.compiled import compiled
-from surgsim.control.torque_laws.base import TorqueProblem
+from surgsim.models.arm import Dynamics
 
 Array = NDArray[np.float64]
+
+
+class Observed(Protocol):
+    """What is measured at a tick, with the nominal dynamics there."""
+
+    @property
+    def dt_s(self) -> float:
+        """Control period [s]."""
+        ...
+
+    @property
+    def v(self) -> Array:
+        """Joint velocities (7,) [rad/s]."""
+        ...
+
+    @property
+    def tau_measured(self) -> Array:
+        """Joint torques that acted over the last period (7,) [N m]."""
+        ...
+
+    @property
+    def dyn(self) -> Dynamics | None:
+        """Nominal dynamics; None on the kinematic plant, where there is nothing to observe."""
+        ...
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -51,11 +76,22 @@ class DisturbanceObserver:
         """Nothing known."""
         return ObserverState(disturbance=np.zeros(7))
 
-    def update(self, state: ObserverState, p: TorqueProblem) -> ObserverState:
-        """Take in the motion since the last tick."""
+    def update(
+        self, state: ObserverState, p: Observed, share: float = 1.0, offset: Array | None = None
+    ) -> ObserverState:
+        """Take in the motion since the last tick.
+
+        Args:
+            state: The state so far.
+            p: What is measured now.
+            share: Share of the gain to be used.
+            offset: By how much the measured torque is off (7,) [N m]; taken off it.
+        """
+        assert p.dyn is not None, "a disturbance torque cannot be seen without dynamics"
         d = state.disturbance
         if state.inertia is not None and state.rest is not None and state.v is not None:
-            d = _corrected(d, state.inertia, state.rest, state.v, p.v, p.tau_measured, self._gain, p.dt_s)
+            tau = p.tau_measured if offset is None else p.tau_measured - offset
+            d = _corrected(d, state.inertia, state.rest, state.v, p.v, tau, share * self._gain, p.dt_s)
         inertia = p.dyn.mass_matrix + p.dt_s * np.diag(self._damping)
         rest = p.dyn.bias + self._damping * p.v - d
         return ObserverState(disturbance=d, inertia=inertia, rest=rest, v=p.v)
@@ -69,6 +105,10 @@ def _corrected(
     return d + gain * (inertia @ ((v - v_last) / dt) - (tau - rest))
 
 
+OFFSET_MEMORY_S = 0.05
+"""Time constant of the mean difference between measured and commanded torque [s]."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DelayEstimate:
     """By how many periods the measured torque lags behind the commanded one.
@@ -79,27 +119,34 @@ class DelayEstimate:
     Attributes:
         commands: Torques commanded, newest first (n, 7) [N m]; NaN before the first.
         scores: Fading squared mismatch of each delay 0..n-1 [(N m)^2].
+        offset: Slow mean of measured less commanded torque (7,) [N m]: of a drive or sensor that is biased.
         ticks: The estimate.
     """
 
     commands: Array
     scores: Array
+    offset: Array
     ticks: int = 0
 
     @staticmethod
     def start(most: int) -> "DelayEstimate":
         """No command yet, no delay."""
-        return DelayEstimate(commands=np.full((most + 1, 7), np.nan), scores=np.zeros(most + 1))
+        return DelayEstimate(
+            commands=np.full((most + 1, 7), np.nan), scores=np.zeros(most + 1), offset=np.zeros(7)
+        )
 
     @property
     def in_flight(self) -> Array:
         """Torques commanded and not yet acting, oldest first (ticks, 7) [N m]."""
         return np.ascontiguousarray(self.commands[: self.ticks][::-1])
 
-    def update(self, tau_measured: Array) -> "DelayEstimate":
+    def update(self, tau_measured: Array, dt_s: float) -> "DelayEstimate":
         """Compare the torque of the last period with what was commanded 1, 2, ... ticks ago."""
         scores, ticks = _score(self.commands, self.scores, tau_measured)
-        return replace(self, scores=scores, ticks=ticks)
+        offset, expected = self.offset, self.commands[ticks]
+        if np.isfinite(expected[0]):
+            offset = offset + dt_s / OFFSET_MEMORY_S * (tau_measured - expected - offset)
+        return replace(self, scores=scores, ticks=ticks, offset=offset)
 
     def sent(self, torque: Array) -> "DelayEstimate":
         """Remember the torque (7,) [N m] commanded now."""

@@ -1,7 +1,7 @@
 """The velocity-level problem that every resolver is given at a tick, and what it answers."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +14,8 @@ from surgsim.models.build import JointLimits
 from surgsim.tasks.base import TipCommand
 
 Array = NDArray[np.float64]
+NO_VALUES = np.zeros(0)
+NO_VALUES.flags.writeable = False
 
 
 class ControlFailure(Exception):
@@ -80,11 +82,13 @@ class Resolution:
         qdot: Joint velocities inside the bounds (7,) [rad/s].
         residual: Norm of the task and RCM rows that `qdot` leaves unmet [m/s].
         command: The tip motion that `qdot` follows, where that is not the task's, for the torque law.
+        values: Values of the resolver's own columns (k,).
     """
 
     qdot: Array
     residual: float
     command: TipCommand | None = None
+    values: Array = field(default_factory=lambda: NO_VALUES)
 
 
 def velocity_bounds(q: Array, limits: JointLimits, position_gain_per_s: float) -> tuple[Array, Array]:

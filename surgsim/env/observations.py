@@ -40,7 +40,7 @@ class _Seen:
     v_WC: Array
 
 
-def observation_of(setup: Setup, state: State, bounds: Specs) -> Observations:
+def observation_of(setup: Setup, state: State, command: TipCommand, bounds: Specs) -> Observations:
     """The observation at `state`, see `surgsim.control.policies.observation.observe`, cut at `bounds`.
 
     The bounds lie outside what a run can reach before its safety limits stop it; only a state that is not
@@ -53,7 +53,7 @@ def observation_of(setup: Setup, state: State, bounds: Specs) -> Observations:
         q=state.q,
         v=state.v,
         kin=kin,
-        command=setup.task.command(state.t_s),
+        command=command,
         rcm=rcm_kinematics(kin, state.p_WC, state.v_WC) if has_trocar else None,
         p_WC=state.p_WC,
         v_WC=state.v_WC,

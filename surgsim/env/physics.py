@@ -12,6 +12,7 @@ from surgsim.plant.state import State
 from surgsim.scenario.schema import Scenario
 from surgsim.simulate.loop import Simulation
 from surgsim.simulate.setup import Setup, prepare
+from surgsim.tasks.base import TipCommand
 from surgsim.trace.trace import Ending, Trace
 
 Array = NDArray[np.float64]
@@ -47,14 +48,18 @@ class SurgsimPhysics(control.Physics):
         return self._simulation.state
 
     @property
+    def command(self) -> TipCommand:
+        """What the task asks for now."""
+        return self._simulation.command
+
+    @property
     def ending(self) -> Ending | None:
         """How the episode ended; None while it runs."""
         return self._simulation.ending
 
     def errors(self) -> tuple[float, float | None]:
         """Tip and RCM error now [m]."""
-        truth, command = self._setup.plant.truth(), self._setup.task.command(self.time())
-        return errors(truth, command, self._scenario.trocar is not None)
+        return errors(self._setup.plant.truth(), self.command, self._scenario.trocar is not None)
 
     def trace(self) -> Trace:
         """The trace of an episode that has ended.

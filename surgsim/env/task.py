@@ -78,7 +78,7 @@ class ScenarioTask(control.Task):
 
     def get_observation(self, physics: SurgsimPhysics) -> Observations:
         """What a controller sees at the present tick."""
-        return observation_of(physics.setup, physics.state, self._observation)
+        return observation_of(physics.setup, physics.state, physics.command, self._observation)
 
     def get_reward(self, physics: SurgsimPhysics) -> float:
         """See `surgsim.env.rewards.reward`."""

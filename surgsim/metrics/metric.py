@@ -15,6 +15,7 @@ class Metric:
         meaning: One line for a person.
         compute: Value from a trace; NaN where the trace does not define it.
         lower_is_better: Direction for rankings; None where there is none.
+        whole: Whether it is of the whole trace, and not of the run without the stop after its outcome.
         digits: Significant digits worth printing.
     """
 
@@ -22,4 +23,5 @@ class Metric:
     meaning: str
     compute: Callable[[Trace], float]
     lower_is_better: bool | None = True
+    whole: bool = False
     digits: int = 4

@@ -2,21 +2,29 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Protocol
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from surgsim.models.config import RobotConfig, SceneConfig
+from surgsim.models.collision import CollisionShapes, collision_shapes
+from surgsim.models.config import RobotConfig, SceneConfig, WallConfig
 from surgsim.models.graft import graft
 from surgsim.models.instrument import attach_instrument
 from surgsim.models.robot import JOINTS, MOTORS, JointLimits, robot_spec
-from surgsim.models.theatre import about_z, attach_patient, attach_port, room_spec
+from surgsim.models.theatre import (
+    CANNULA_JOINTS,
+    GRAVITY_M_PER_S2,
+    about_z,
+    attach_patient,
+    attach_port,
+    room_spec,
+)
 
 __all__ = ["JointLimits", "Scene", "SpecModifier", "build", "build_arm"]
 
-GRAVITY_M_PER_S2 = 9.81
 Ids = NDArray[np.intp]
 
 
@@ -41,7 +49,13 @@ class Scene:
         shaft_entry_site: Start of the shaft, a second point of its axis; the wrist without an instrument.
         trocar_site: Remote centre of motion, z out of the patient.
         port_mocap: Row of the port in `mocap_pos`.
+        wall: The compliant wall; None if the trocar is an ideal point.
+        clearance_m: Half of bore diameter minus shaft diameter [m]; NaN without trocar or instrument.
+        cannula_qpos_ids: Where the cannula's displacement, in the port's frame, is in `qpos` (3,); (0,)
+            without a wall.
+        cannula_dof_ids: Where its velocity is in `qvel` (3,); (0,) without a wall.
         limits: What the joints can do.
+        shapes: Where forbidden contacts are looked for.
     """
 
     model: mujoco.MjModel
@@ -53,7 +67,12 @@ class Scene:
     shaft_entry_site: int
     trocar_site: int | None
     port_mocap: int | None
+    wall: WallConfig | None
+    clearance_m: float
+    cannula_qpos_ids: Ids
+    cannula_dof_ids: Ids
     limits: JointLimits
+    shapes: CollisionShapes
 
 
 def build(config: SceneConfig, modifiers: Sequence[SpecModifier] = (), *, drawn: bool = True) -> Scene:
@@ -77,11 +96,14 @@ def build(config: SceneConfig, modifiers: Sequence[SpecModifier] = (), *, drawn:
             attach_patient(spec, config, config.trocar)
     for modifier in modifiers:
         modifier.modify(spec)
-    return _compile(spec)
+    return _compile(spec, config)
 
 
+@lru_cache(maxsize=16)
 def build_arm(config: SceneConfig) -> Scene:
     """Robot and instrument alone, without drawings: the controller's nominal model.
+
+    Compiled once for the runs of a batch.
 
     Raises:
         SurgsimError: As `build`.
@@ -89,7 +111,7 @@ def build_arm(config: SceneConfig) -> Scene:
     spec = mujoco.MjSpec()
     spec.compiler.discardvisual = True
     _add_arm(spec, config)
-    return _compile(spec)
+    return _compile(spec, config.model_copy(update={"trocar": None}))
 
 
 def _add_arm(spec: mujoco.MjSpec, config: SceneConfig) -> None:
@@ -97,7 +119,8 @@ def _add_arm(spec: mujoco.MjSpec, config: SceneConfig) -> None:
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET  # divergence must be seen
     spec.option.gravity = [0.0, 0.0, -GRAVITY_M_PER_S2]
-    arm = robot_spec(config.robot.name, config.robot.dh_variant)
+    drawn = not spec.compiler.discardvisual
+    arm = robot_spec(config.robot.name, config.robot.dh_variant, drawn=drawn)
     attach_instrument(arm, config.instrument)
     graft(spec, arm, frame=_base_frame(spec, config.robot))
 
@@ -106,8 +129,10 @@ def _base_frame(spec: mujoco.MjSpec, robot: RobotConfig) -> mujoco.MjsFrame:
     return spec.worldbody.add_frame(pos=robot.base_position_m, quat=about_z(robot.base_yaw_rad))
 
 
-def _compile(spec: mujoco.MjSpec) -> Scene:
+def _compile(spec: mujoco.MjSpec, config: SceneConfig) -> Scene:
     model = spec.compile()
+    wall = None if config.trocar is None else config.trocar.wall
+    slides = [] if wall is None else [model.joint(name) for name in CANNULA_JOINTS]
     joints = [model.joint(name) for name in JOINTS]
     port = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, "port")
     return Scene(
@@ -120,7 +145,12 @@ def _compile(spec: mujoco.MjSpec) -> Scene:
         shaft_entry_site=model.site("shaft_entry").id,
         trocar_site=model.site("trocar").id if port >= 0 else None,
         port_mocap=int(model.body_mocapid[port]) if port >= 0 else None,
+        wall=wall,
+        clearance_m=config.clearance_m,
+        cannula_qpos_ids=_ids([slide.qposadr[0] for slide in slides]),
+        cannula_dof_ids=_ids([slide.dofadr[0] for slide in slides]),
         limits=JointLimits.of(model),
+        shapes=collision_shapes(model, config),
     )
 
 

@@ -1,8 +1,9 @@
 """What a scene is made of."""
 
+import math
 from typing import Annotated, Literal, Self
 
-from pydantic import Field, FiniteFloat, PositiveFloat, model_validator
+from pydantic import Field, FiniteFloat, NonNegativeFloat, PositiveFloat, model_validator
 
 from surgsim.catalog import PartConfig
 
@@ -55,12 +56,73 @@ class InstrumentConfig(PartConfig):
         return self
 
 
+class WallConfig(PartConfig):
+    """Compliant abdominal wall that holds the cannula, and the contact of the shaft with the cannula.
+
+    Attributes:
+        lateral_stiffness_n_per_m: Of the wall across the port's axis [N/m].
+        lateral_damping_n_s_per_m: Of the wall across the axis [N s/m].
+        axial_stiffness_n_per_m: Of the wall along the axis [N/m].
+        axial_damping_n_s_per_m: Of the wall along the axis [N s/m].
+        mass_kg: Cannula and the tissue that moves with it [kg].
+        contact_stiffness_n_per_m: Of shaft against bore [N/m].
+        contact_damping_n_s_per_m: Of shaft against bore [N s/m].
+        seal_friction_n: Dry friction of the seal along the shaft [N].
+        seal_stiffness_n_per_m: Of the seal's lip while it sticks [N/m].
+        seal_damping_n_s_per_m: Of the seal's lip while it sticks [N s/m].
+        tear_force_n: Force of the shaft on the wall past which the incision tears [N].
+    """
+
+    lateral_stiffness_n_per_m: PositiveFloat = 1000.0
+    lateral_damping_n_s_per_m: NonNegativeFloat = 15.0
+    axial_stiffness_n_per_m: PositiveFloat = 1000.0
+    axial_damping_n_s_per_m: NonNegativeFloat = 15.0
+    mass_kg: PositiveFloat = 0.05
+    contact_stiffness_n_per_m: PositiveFloat = 20000.0
+    contact_damping_n_s_per_m: NonNegativeFloat = 15.0
+    seal_friction_n: NonNegativeFloat = 1.0
+    seal_stiffness_n_per_m: PositiveFloat = 20000.0
+    seal_damping_n_s_per_m: NonNegativeFloat = 15.0
+    tear_force_n: PositiveFloat = 30.0
+
+    def check(self, timestep_s: float) -> None:
+        """Refuse what the timestep cannot follow.
+
+        The cannula's mass m on stiffness k and explicit damping b is stable for k h²/m + 2 b h/m < 4 with
+        timestep h; a quarter of that, k h²/m + b h/m <= 1, is asked for.
+
+        Raises:
+            ValueError: With the largest timestep allowed.
+        """
+        lateral = (
+            self.lateral_stiffness_n_per_m + self.contact_stiffness_n_per_m,
+            self.contact_damping_n_s_per_m,
+        )
+        axial = (self.axial_stiffness_n_per_m + self.seal_stiffness_n_per_m, self.seal_damping_n_s_per_m)
+        longest = min(_longest_step(k, b, self.mass_kg) for k, b in (lateral, axial))
+        if timestep_s > longest:
+            raise ValueError(
+                f"trocar.wall: stiffness and damping of contact and seal need a timestep of at most "
+                f"{longest:.3g} s for a cannula of mass_kg {self.mass_kg:g}, not {timestep_s:g} s"
+            )
+
+
+def _longest_step(stiffness: float, damping: float, mass: float) -> float:
+    """Positive root h of k h² + b h = m."""
+    return float((math.sqrt(damping**2 + 4.0 * stiffness * mass) - damping) / (2.0 * stiffness))
+
+
 class TrocarConfig(PartConfig):
-    """Port in the abdominal wall; `axis` points out of the patient."""
+    """Port in the abdominal wall; `axis` points out of the patient.
+
+    Attributes:
+        wall: Compliant wall with contact; null: an ideal point that nothing touches.
+    """
 
     position_m: Vec3
     axis: Vec3 = (0.0, 0.0, 1.0)
     bore_diameter_m: PositiveFloat = 0.0089
+    wall: WallConfig | None = None
 
     @model_validator(mode="after")
     def _axis_is_a_direction(self) -> Self:
@@ -81,3 +143,24 @@ class SceneConfig(PartConfig):
     trocar: TrocarConfig | None = None
     theatre: bool = True
     timestep_s: PositiveFloat = 0.001
+
+    @model_validator(mode="after")
+    def _wall_is_possible(self) -> Self:
+        if self.trocar is None or self.trocar.wall is None:
+            return self
+        if self.instrument is None:
+            raise ValueError("trocar.wall needs an instrument: set instrument, or trocar.wall to null")
+        if self.clearance_m <= 0.0:
+            raise ValueError(
+                f"instrument.shaft_diameter_m {self.instrument.shaft_diameter_m:g} must be below the bore, "
+                f"{self.trocar.bore_diameter_m:g}"
+            )
+        self.trocar.wall.check(self.timestep_s)
+        return self
+
+    @property
+    def clearance_m(self) -> float:
+        """Half of bore diameter minus shaft diameter [m]; NaN without trocar or instrument."""
+        if self.trocar is None or self.instrument is None:
+            return math.nan
+        return (self.trocar.bore_diameter_m - self.instrument.shaft_diameter_m) / 2.0

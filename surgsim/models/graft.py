@@ -1,13 +1,32 @@
 """Put one MJCF model into another without changing what its parts are called."""
 
+from functools import lru_cache
+
 import mujoco
 
 from surgsim.resources import resource_dir
 
 
-def asset(path: str) -> mujoco.MjSpec:
-    """The MJCF file `path` under `assets/`."""
-    return mujoco.MjSpec.from_file(str(resource_dir("assets") / path))
+def asset(path: str, *, drawn: bool = True) -> mujoco.MjSpec:
+    """The MJCF file `path` under `assets/`, to be changed; unless `drawn` without what is only looked at.
+
+    MuJoCo can discard that itself, but computes its meshes first, which takes longer than all the rest.
+    """
+    return _read(str(resource_dir("assets") / path), drawn).copy()
+
+
+@lru_cache(maxsize=32)
+def _read(file: str, drawn: bool) -> mujoco.MjSpec:
+    spec = mujoco.MjSpec.from_file(file)
+    if not drawn:
+        for geom in list(spec.geoms):
+            if not (geom.contype or geom.conaffinity):
+                spec.delete(geom)
+        used = {geom.meshname for geom in spec.geoms}
+        for mesh in list(spec.meshes):
+            if mesh.name not in used:
+                spec.delete(mesh)
+    return spec
 
 
 def graft(

@@ -8,15 +8,15 @@ for: `velocity_limit_rad_per_s`, `acceleration_limit_rad_per_s2`, and where they
 """
 
 from dataclasses import dataclass
-from typing import Self
+from typing import Self, get_args
 
 import mujoco
 import numpy as np
 from numpy.typing import ArrayLike
 
 from surgsim.errors import SurgsimError, unknown_name
+from surgsim.models.config import RobotName
 from surgsim.models.graft import asset
-from surgsim.resources import resource_dir
 from surgsim.spatial import Array
 
 JOINTS = tuple(f"joint{i}" for i in range(1, 8))
@@ -65,19 +65,20 @@ class JointLimits:
 
 def robot_names() -> list[str]:
     """Names of the shipped robots, sorted."""
-    folders = resource_dir("assets").iterdir()
-    return sorted(folder.name for folder in folders if (folder / f"{folder.name}.xml").is_file())
+    return sorted(get_args(RobotName))
 
 
-def robot_spec(name: str, dh_variant: str = "standard") -> mujoco.MjSpec:
+def robot_spec(name: str, dh_variant: str = "standard", *, drawn: bool = True) -> mujoco.MjSpec:
     """The arm alone, its base at the origin; `literal` moves link 3 along the axis of joint 2 by d2 = 0.2 m.
+
+    Unless `drawn`, without what is only looked at.
 
     Raises:
         SurgsimError: If there is no such robot.
     """
     if name not in robot_names():
         raise SurgsimError(unknown_name(name, "robot", robot_names()))
-    spec = asset(f"{name}/{name}.xml")
+    spec = asset(f"{name}/{name}.xml", drawn=drawn)
     if dh_variant == "literal":
         axis = np.array(spec.joint("joint2").axis)
         link = spec.body("link3")

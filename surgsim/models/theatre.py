@@ -5,11 +5,13 @@ import math
 import mujoco
 import numpy as np
 
-from surgsim.models.config import SceneConfig, TrocarConfig
+from surgsim.models.config import SceneConfig, TrocarConfig, WallConfig
 from surgsim.models.graft import asset, graft
 from surgsim.models.surfaces import drape_mesh, inward_ellipsoid
 from surgsim.spatial import Array, unit
 
+GRAVITY_M_PER_S2 = 9.81
+CANNULA_JOINTS = ("cannula_x", "cannula_y", "cannula_z")
 _FREE_VIEW_M = np.array([0.5, 0.0, 0.25])  # where the cameras look when there is no trocar, from the base
 _TUBE_INNER_SHARE = 0.88  # inner radius of the mesh `tube` before scaling
 
@@ -25,7 +27,10 @@ def room_spec(config: SceneConfig) -> mujoco.MjSpec:
 
 
 def attach_port(scene: mujoco.MjSpec, trocar: TrocarConfig) -> None:
-    """Add the mocap body `port` with site `trocar` at its centre, z out of the patient."""
+    """Add the mocap body `port` with site `trocar` at its centre, z out of the patient.
+
+    With a wall the drawn port moves on its own body `cannula`, and `port` is its place of rest.
+    """
     spec = asset("trocar/port.xml")
     tube = spec.mesh("tube")
     radius = trocar.bore_diameter_m / 2 / _TUBE_INNER_SHARE
@@ -33,22 +38,51 @@ def attach_port(scene: mujoco.MjSpec, trocar: TrocarConfig) -> None:
     port = spec.body("port")
     port.pos = trocar.position_m
     port.quat = _z_to(unit(np.array(trocar.axis)))
+    if trocar.wall is not None:
+        _hang(spec, trocar.wall)
     graft(scene, spec, frame=scene.worldbody.add_frame())
+
+
+def _hang(spec: mujoco.MjSpec, wall: WallConfig) -> None:
+    """Turn the port into the body `cannula` on three springs, and leave an empty mocap body at its place.
+
+    The springs' reference carries the cannula's weight, so that it rests at the configured place.
+    """
+    cannula = spec.body("port")
+    spec.delete(spec.site("trocar"))
+    cannula.name, cannula.mocap = "cannula", False
+    cannula.mass, cannula.inertia, cannula.explicitinertial = wall.mass_kg, [wall.mass_kg * 1e-4] * 3, True
+    cannula.ipos = [0.0, 0.0, 0.0]
+    up = np.zeros(3)
+    mujoco.mju_rotVecQuat(up, np.array([0.0, 0.0, 1.0]), cannula.quat * (1, -1, -1, -1))
+    stiffness = (wall.lateral_stiffness_n_per_m,) * 2 + (wall.axial_stiffness_n_per_m,)
+    damping = (wall.lateral_damping_n_s_per_m,) * 2 + (wall.axial_damping_n_s_per_m,)
+    for name, axis, k, d, share in zip(CANNULA_JOINTS, np.eye(3), stiffness, damping, up, strict=True):
+        joint = cannula.add_joint(name=name, type=mujoco.mjtJoint.mjJNT_SLIDE, axis=axis)
+        joint.stiffness, joint.damping = [k, 0.0, 0.0], [d, 0.0, 0.0]
+        joint.springref = wall.mass_kg * GRAVITY_M_PER_S2 * share / k
+    rest = spec.worldbody.add_body(name="port", mocap=True, pos=cannula.pos, quat=cannula.quat)
+    rest.add_site(name="trocar", group=4)
 
 
 def attach_patient(scene: mujoco.MjSpec, config: SceneConfig, trocar: TrocarConfig) -> None:
     """Add patient and table so that the abdomen's skin passes through the trocar, normal to its axis."""
     spec = asset("theatre/patient.xml")
-    heading = _heading(config)
-    axis = _rotated(unit(np.array(trocar.axis)), -heading)
-    skin = _ellipsoid_point(np.array(spec.geom("abdomen").size), axis)
-    centre = np.array(trocar.position_m) - _rotated(skin, heading)
+    centre, heading = patient_place(config, trocar, np.array(spec.geom("abdomen").size))
     patient = spec.body("patient")
     patient.pos, patient.quat = centre, about_z(heading)
     floor = config.robot.base_position_m[2] + float(scene.geom("floor").pos[2])
     _cover(spec)
     _stand_on(spec, floor - float(centre[2]))
     graft(scene, spec, frame=scene.worldbody.add_frame())
+
+
+def patient_place(config: SceneConfig, trocar: TrocarConfig, abdomen: Array) -> tuple[Array, float]:
+    """Centre (3,) [m] of the abdomen with these semi-axes (3,) [m], and its turn about the vertical [rad]."""
+    heading = _heading(config)
+    axis = _rotated(unit(np.array(trocar.axis)), -heading)
+    skin = _ellipsoid_point(abdomen, axis)
+    return np.array(trocar.position_m) - _rotated(skin, heading), heading
 
 
 def _cover(spec: mujoco.MjSpec) -> None:

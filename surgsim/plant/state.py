@@ -1,11 +1,13 @@
 """What the plant lets a controller see."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+NO_FORCE = np.zeros(3)
+NO_FORCE.flags.writeable = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -18,7 +20,8 @@ class State:
         v: Joint velocities (7,) [rad/s].
         tau: Joint torques that the actuators gave over the last period (7,) [N m].
         p_WC: Trocar position, world frame (3,) [m]; NaN without a trocar.
-        v_WC: Trocar velocity (3,) [m/s]; zeros without a trocar.
+        v_WC: Trocar velocity as announced to the controller (3,) [m/s]; zeros where nobody announces it.
+        f_T: Force of the surroundings on the tip, as a sensor at the tip measures it, world frame (3,) [N].
     """
 
     t_s: float
@@ -27,3 +30,4 @@ class State:
     tau: Array
     p_WC: Array
     v_WC: Array
+    f_T: Array = field(default_factory=lambda: NO_FORCE)

@@ -1,6 +1,6 @@
-"""Where things really are, for the trace: never shown to a controller."""
+"""Where things really are, for the trace and the safety limits: never shown to a controller."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import mujoco
 import numpy as np
@@ -9,22 +9,50 @@ from numpy.typing import NDArray
 from surgsim.models.build import Scene
 
 Array = NDArray[np.float64]
-_NOWHERE = np.full(3, np.nan)
+NOWHERE = np.full(3, np.nan)
+NOWHERE.flags.writeable = False
+NO_VALUES = np.zeros(0)
+NO_VALUES.flags.writeable = False
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Contact:
+    """A contact that must not be.
+
+    Attributes:
+        detail: What touches what and how deep, in words.
+        with_patient: Whether patient or table are touched, not the arm itself.
+    """
+
+    detail: str
+    with_patient: bool
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Truth:
-    """True points of instrument and port, world frame.
+    """True motion of arm, instrument and port, world frame.
 
     Attributes:
+        q: Joint positions (7,) [rad].
+        v: Joint velocities (7,) [rad/s].
         p_WT: Tip (3,) [m].
         p_WR: Wrist: the shaft's second point (3,) [m].
-        p_WC: Trocar (3,) [m]; NaN without one.
+        p_WC: Trocar: the incision at rest, breathing included (3,) [m]; NaN without one.
+        f_C: Force of the shaft on the abdominal wall (3,) [N]; NaN without a physical wall.
+        f_T: Force of the surroundings on the tip (3,) [N]; NaN where nothing can touch it.
+        contact: Forbidden contact, or None.
+        values: Values of the plant's own columns (k,).
     """
 
+    q: Array
+    v: Array
     p_WT: Array
     p_WR: Array
     p_WC: Array
+    f_C: Array = field(default_factory=lambda: NOWHERE)
+    f_T: Array = field(default_factory=lambda: NOWHERE)
+    contact: Contact | None = None
+    values: Array = field(default_factory=lambda: NO_VALUES)
 
 
 def arm_view(values: Array, ids: NDArray[np.intp]) -> Array:
@@ -35,8 +63,8 @@ def arm_view(values: Array, ids: NDArray[np.intp]) -> Array:
     return values[first : first + len(ids)]
 
 
-class TruthReader:
-    """Copies the points out of MuJoCo's data."""
+class PointReader:
+    """Copies tip, wrist and trocar out of MuJoCo's data."""
 
     def __init__(self, scene: Scene, data: mujoco.MjData) -> None:
         self._points = data.site_xpos
@@ -44,7 +72,7 @@ class TruthReader:
         trocar = scene.tip_site if scene.trocar_site is None else scene.trocar_site
         self._sites = np.array([scene.tip_site, scene.shaft_entry_site, trocar])
 
-    def read(self) -> Truth:
-        """The points as they are now."""
+    def read(self) -> tuple[Array, Array, Array]:
+        """Tip, wrist and trocar, each (3,) [m], as they are now."""
         p_WT, p_WR, p_WC = self._points[self._sites]
-        return Truth(p_WT=p_WT, p_WR=p_WR, p_WC=p_WC if self._has_trocar else _NOWHERE)
+        return p_WT, p_WR, p_WC if self._has_trocar else NOWHERE

@@ -15,7 +15,7 @@ _BACKGROUND = (52, 60, 66)
 
 def blueprint(scenario: Scenario, trace: Trace) -> rrb.Blueprint:
     """The layout that is stored in the file."""
-    left = rrb.Vertical(scene_view(scenario, trace), _texts(), row_shares=[0.72, 0.28])
+    left = rrb.Vertical(scene_view(scenario, trace), texts_view(), row_shares=[0.72, 0.28])
     middle = rrb.Vertical(
         plot("Tip and RCM error [mm]", ERRORS),
         _tabs(
@@ -78,11 +78,12 @@ def _focus(scenario: Scenario, trace: Trace) -> Array:
     return np.array(trace.block("tip")[0])
 
 
-def _texts() -> rrb.Tabs:
+def texts_view(below: str = "") -> rrb.Tabs:
+    """Result, scenario and log below entity `below`, as tabs."""
     return _tabs(
-        rrb.TextDocumentView(name="Result", origin=f"/{SUMMARY}/result"),
-        rrb.TextDocumentView(name="Scenario", origin=f"/{SUMMARY}/scenario"),
-        rrb.TextLogView(name="Log", origin=f"/{LOG}"),
+        rrb.TextDocumentView(name="Result", origin=f"/{below}{SUMMARY}/result"),
+        rrb.TextDocumentView(name="Scenario", origin=f"/{below}{SUMMARY}/scenario"),
+        rrb.TextLogView(name="Log", origin=f"/{below}{LOG}"),
     )
 
 

@@ -27,13 +27,21 @@ def export(trace: Trace, path: Path) -> None:
     Raises:
         SurgsimError: If the suffix is another one, or the file cannot be written.
     """
-    writer = _WRITERS.get(path.suffix.lower())
-    if writer is None:
+    check_export(path)
+    with replacing(path) as temporary:
+        _WRITERS[path.suffix.lower()](trace, temporary)
+
+
+def check_export(path: Path) -> None:
+    """Refuse a file that `export` does not write.
+
+    Raises:
+        SurgsimError: If its suffix is another one.
+    """
+    if path.suffix.lower() not in _WRITERS:
         raise SurgsimError(
             f"{path}: cannot export to '{path.suffix}'. Allowed: {', '.join(sorted(_WRITERS))}."
         )
-    with replacing(path) as temporary:
-        writer(trace, temporary)
 
 
 def _write_parquet(trace: Trace, path: Path) -> None:

@@ -14,9 +14,10 @@ import numpy as np
 import pyarrow as pa
 from rerun.chunk import RrdReader
 
+from surgsim.columns import Block
 from surgsim.errors import RecordingError
 from surgsim.recording.layout import APPLICATION, HEADER, SERIES, TIMELINE, Header, series_path, timestamps
-from surgsim.trace.trace import Array, Block
+from surgsim.trace.trace import Array
 
 _SCALARS = "Scalars:scalars"
 

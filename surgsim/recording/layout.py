@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from surgsim.trace.trace import Array, Block, Trace, TraceMeta
+from surgsim.columns import Block
+from surgsim.trace.trace import Array, Trace, TraceMeta
 
 APPLICATION = "surgsim"
 SCHEMA_VERSION = 1

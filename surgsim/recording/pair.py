@@ -8,12 +8,13 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from surgsim.errors import RecordingError
-from surgsim.recording.blueprint import plot, scene_view
+from surgsim.recording.blueprint import plot, scene_view, texts_view
 from surgsim.recording.files import replacing
 from surgsim.recording.layout import APPLICATION, ERRORS, LIMITS, TIMELINE, series_path
 from surgsim.recording.read import Recorded
 from surgsim.recording.scene import log_scene, scenario_of
 from surgsim.recording.signals import log_signals
+from surgsim.recording.write import log_texts
 from surgsim.trace.trace import Trace
 
 _SIDES = ("a", "b")
@@ -30,10 +31,11 @@ def write_pair(path: Path, pair: Sequence[Recorded]) -> None:
     with replacing(path) as temporary:
         stream.save(temporary, default_blueprint=_blueprint(traces))
         stream.send_recording_name(" | ".join(title(trace) for trace in traces))
-        for side, trace in zip(_SIDES, traces, strict=True):
-            below = _Below(stream, side)
+        for side, recorded in zip(_SIDES, pair, strict=True):
+            below, trace = _Below(stream, side), recorded.trace
             log_signals(below, trace)
             log_scene(below, scenario_of(trace), trace)
+            log_texts(below, trace.meta, recorded.metrics)
         try:
             stream.flush()
             stream.disconnect()
@@ -58,6 +60,10 @@ class _Below:
         """As the stream's."""
         self._stream.log(f"{self._side}/{path}", *parts, **options)
 
+    def set_time(self, timeline: str, **options: Any) -> None:
+        """As the stream's."""
+        self._stream.set_time(timeline, **options)
+
     def send_columns(self, path: str, *parts: Any, **options: Any) -> None:
         """As the stream's."""
         self._stream.send_columns(f"{self._side}/{path}", *parts, **options)
@@ -75,7 +81,7 @@ def _blueprint(traces: Sequence[Trace]) -> rrb.Blueprint:
 
 
 def _column(side: str, trace: Trace) -> rrb.Vertical:
-    """Scene, errors, manipulability and torques of one run."""
+    """Scene, errors, manipulability, torques and texts of one run."""
     return rrb.Vertical(
         scene_view(scenario_of(trace), trace, below=f"{side}/", name=title(trace)),
         rrb.Horizontal(
@@ -83,5 +89,6 @@ def _column(side: str, trace: Trace) -> rrb.Vertical:
             plot("Manipulability", f"{side}/{series_path('manipulability')}"),
             plot("Torque [N m]", f"{side}/{series_path('tau')}", f"{side}/{LIMITS}/tau"),
         ),
-        row_shares=[0.62, 0.38],
+        texts_view(f"{side}/"),
+        row_shares=[0.5, 0.3, 0.2],
     )

@@ -13,7 +13,7 @@ import numpy as np
 from surgsim.errors import RecordingError
 from surgsim.recording.framing import check_framing, recording_file
 from surgsim.recording.layout import SEAL, Header, seal
-from surgsim.trace.trace import Array, Trace
+from surgsim.trace.trace import BASE_BLOCKS, Array, Trace
 
 _TIMEOUT_S = 120.0
 
@@ -44,7 +44,23 @@ def read_recording(path: Path) -> Recorded:
     if seal(data, texts) != sha256:
         raise RecordingError(f"{file}: damaged recording: it does not hold what was written")
     header = Header.from_texts(texts)
+    if reason := _fault(header):
+        raise RecordingError(f"{file}: damaged recording: {reason}")
     return Recorded(trace=Trace(data, header.blocks, header.meta), metrics=header.metrics)
+
+
+def _fault(header: Header) -> str:
+    """What every run has and this one has not, or nothing."""
+    found = {name for block in header.blocks for name in block.columns}
+    missing = [name for block in BASE_BLOCKS for name in block.columns if name not in found]
+    if missing:
+        return f"it has no column '{missing[0]}'"
+    scenario = header.meta.scenario
+    try:
+        named = isinstance(scenario["name"], str) and isinstance(scenario["controller"]["name"], str)
+        return "" if named and isinstance(scenario["seed"], int) else "its scenario has no name or seed"
+    except (KeyError, TypeError) as error:
+        return f"its scenario is not whole: {error}"
 
 
 def _extract(file: Path) -> bytes:

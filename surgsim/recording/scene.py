@@ -8,6 +8,7 @@ import numpy as np
 import rerun as rr
 
 from surgsim.models.build import Scene, build
+from surgsim.plant.bystanders import joint_columns
 from surgsim.recording import palette
 from surgsim.recording.layout import SCENE, TIMELINE, timestamps
 from surgsim.recording.shapes import Triangles, geom_triangles, joined
@@ -25,8 +26,8 @@ def scenario_of(trace: Trace) -> Scenario:
 
 
 def rebuild(scenario: Scenario) -> Scene:
-    """The scene that was simulated, disturbances included."""
-    return build(scenario.scene, scenario.build_disturbances())
+    """The scene that was simulated, disturbances and props included."""
+    return build(scenario.scene, scenario.build_parts())
 
 
 def log_scene(stream: rr.RecordingStream, scenario: Scenario, trace: Trace) -> None:
@@ -72,12 +73,15 @@ def body_poses(scene: Scene, trace: Trace, rows: np.ndarray[tuple[int], np.dtype
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     q, trocar = trace.block("q")[rows], trace.block("trocar")[rows]
+    blocks, places = joint_columns(model)
+    others = np.column_stack([np.zeros((len(rows), 0)), *(trace.block(block.name)[rows] for block in blocks)])
     port = None if scene.port_mocap is None else data.mocap_pos[scene.port_mocap]
     offset = np.zeros(3) if port is None else port - data.site_xpos[scene.trocar_site]
     position = np.empty((len(rows), model.nbody, 3))
     quaternion = np.empty((len(rows), model.nbody, 4))
     for i in range(len(rows)):
         data.qpos[scene.qpos_ids] = q[i]
+        data.qpos[places] = others[i]
         if port is not None:
             port[:] = trocar[i] + offset
         mujoco.mj_kinematics(model, data)

@@ -5,9 +5,10 @@ from collections.abc import Sequence
 import numpy as np
 import rerun as rr
 
+from surgsim.columns import Block
 from surgsim.recording import palette
 from surgsim.recording.layout import ERRORS, LIMITS, TIMELINE, series_path, timestamps
-from surgsim.trace.trace import Array, Block, Trace
+from surgsim.trace.trace import Array, Trace
 
 _SCALAR_COLORS = {
     "manipulability_6d": palette.ORANGE,

@@ -39,7 +39,7 @@ def write_recording(path: Path, trace: Trace, metrics: Mapping[str, float | None
         stream.log(HEADER, rr.AnyValues(**texts, **{SEAL: sha256}), static=True)
         log_signals(stream, trace)
         log_scene(stream, scenario, trace)
-        _log_texts(stream, trace.meta, metrics)
+        log_texts(stream, trace.meta, metrics)
         _finish(stream, temporary, path)
 
 
@@ -53,7 +53,8 @@ def _finish(stream: rr.RecordingStream, temporary: Path, path: Path) -> None:
         raise RecordingError(f"{path}: cannot be written whole; is the disk full? ({error})") from error
 
 
-def _log_texts(stream: rr.RecordingStream, meta: TraceMeta, metrics: Mapping[str, float | None]) -> None:
+def log_texts(stream: rr.RecordingStream, meta: TraceMeta, metrics: Mapping[str, float | None]) -> None:
+    """Log how the run ended, its metrics and its scenario."""
     texts = {"result": result_markdown(meta, metrics), "scenario": scenario_markdown(meta)}
     for name, text in texts.items():
         document = rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN)

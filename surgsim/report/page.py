@@ -5,11 +5,14 @@ from pathlib import Path
 
 from surgsim import __version__
 from surgsim.report import html
+from surgsim.report.axes import axes_of, sweeps_of
 from surgsim.report.results import Results
+from surgsim.report.sections.gain_maps import maps_section
 from surgsim.report.sections.leaderboard import boards_of, failures_section, leaderboard_section
 from surgsim.report.sections.methods import methods_section, versions_section
 from surgsim.report.sections.pairs import pairs_section
 from surgsim.report.sections.ranking import ranking_section
+from surgsim.report.sections.robustness import robustness_section
 from surgsim.report.sections.runs import runs_section
 from surgsim.report.sections.scenario import scenario_section
 from surgsim.report.series import Series
@@ -24,6 +27,8 @@ def page(results: Results, series: Mapping[str, Series], file: Path) -> str:
     parts = [
         leaderboard_section(results, boards),
         failures_section(results),
+        robustness_section(results),
+        maps_section(results),
         ranking_section(results, boards),
         pairs_section(results),
         *(scenario_section(results, name, k, series.get(name)) for k, name in enumerate(scenarios)),
@@ -82,6 +87,8 @@ def _header(results: Results) -> str:
 
 def _navigation(results: Results) -> str:
     targets = [("leaderboard", "Leaderboard"), ("failures", "Failures")]
+    targets += [("robustness", "Robustness")] if sweeps_of(results) else []
+    targets += [("frontier", "Frontier")] if len(axes_of(results)) > 1 else []
     if results.metrics:
         targets.append(("ranking", "Rank"))
         targets += [("pairs", "Pairs")] if len(results.runs.controllers) > 1 else []

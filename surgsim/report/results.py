@@ -12,6 +12,7 @@ from surgsim.compare.observations import Observations
 from surgsim.compare.table import read_table
 from surgsim.errors import SurgsimError
 from surgsim.metrics.catalog import METRICS
+from surgsim.recording.sealed import read_sealed
 
 _HEADLINE = (
     "rcm_error_rms_mm",
@@ -85,12 +86,9 @@ def _suite(path: Path) -> Mapping[str, Any]:
     if not path.is_file():
         return {}
     try:
-        found = json.loads(path.read_text(encoding="utf-8"))
+        return read_sealed(path)
     except (OSError, ValueError) as error:
         raise SurgsimError(f"{path} is damaged: {error}") from error
-    if not isinstance(found, dict):
-        raise SurgsimError(f"{path} is damaged: it holds no object")
-    return found
 
 
 def parameters_of(text: str) -> dict[str, Any]:

@@ -65,7 +65,10 @@ def read_series(
     most = max(1, MOST_RUNS * MOST_RECORDINGS // max(count, MOST_RECORDINGS))
     chosen = {name: _first_of_each(runs, most) for name, runs in chosen.items() if runs}
     say(f"reading {sum(len(runs) for runs in chosen.values())} recordings for the figures over time")
-    return {name: _series(root, runs) for name, runs in chosen.items()}
+    found = {name: _series(root, runs) for name, runs in chosen.items()}
+    if lost := sum(series.unreadable for series in found.values()):
+        say(f"{lost} recordings could not be read: the figures over time leave them out")
+    return found
 
 
 def _choose(root: Path, rows: Sequence[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
@@ -118,7 +121,7 @@ def _series(root: Path, rows: Sequence[Mapping[str, Any]]) -> Series:
 
 def _trace(path: Path) -> Trace | None:
     try:
-        return read_recording(path).trace
+        return read_recording(path).trace.active()
     except SurgsimError:
         return None
 

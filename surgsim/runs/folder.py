@@ -7,12 +7,14 @@ import tempfile
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
+from hashlib import sha256
 from pathlib import Path
 from time import perf_counter
 from typing import Any
 
 from surgsim.errors import SurgsimError
 from surgsim.metrics.catalog import compute_metrics
+from surgsim.recording.sealed import sealed
 from surgsim.runs.provenance import provenance
 from surgsim.scenario.schema import Scenario
 from surgsim.scenario.yaml_text import dump_yaml
@@ -69,8 +71,10 @@ def execute(scenario: Scenario, progress: Progress | None = None) -> RunResult:
     return RunResult(trace=trace, metrics=compute_metrics(trace), wall_time_s=wall)
 
 
-def write_run(scenario: Scenario, result: RunResult, folder: Path, *, record: bool) -> None:
-    """Write a run's folder.
+def write_run(
+    scenario: Scenario, result: RunResult, folder: Path, *, record: bool, operator_input: str | None = None
+) -> None:
+    """Write a run's folder; `operator_input` is the record of a person's input, if one operated.
 
     Raises:
         SurgsimError: If the folder cannot be written.
@@ -78,6 +82,9 @@ def write_run(scenario: Scenario, result: RunResult, folder: Path, *, record: bo
     with whole_folder(folder) as draft:
         outcome = result.trace.meta.ending.to_dict()
         summary = summary_of(scenario, outcome, result.metrics, result.wall_time_s)
+        if operator_input is not None:
+            summary["provenance"]["operator_input_sha256"] = sha256(operator_input.encode()).hexdigest()
+            (draft / "operator_input.csv").write_text(operator_input)
         write_summary(draft, scenario, summary)
         if record:
             from surgsim.recording.write import write_recording  # rerun takes a second to import
@@ -88,7 +95,7 @@ def write_run(scenario: Scenario, result: RunResult, folder: Path, *, record: bo
 def write_summary(draft: Path, scenario: Scenario, summary: Mapping[str, Any]) -> None:
     """Write `scenario.yaml` and `metrics.json` into a folder that is being made."""
     (draft / "scenario.yaml").write_text(dump_yaml(scenario.resolved()))
-    (draft / "metrics.json").write_text(json.dumps(summary, indent=2) + "\n")
+    (draft / "metrics.json").write_text(json.dumps(sealed(summary), indent=2) + "\n")
 
 
 def check_target(folder: Path) -> None:

@@ -10,6 +10,7 @@ from surgsim.errors import ScenarioError, unknown_name
 from surgsim.resources import resource_dir
 from surgsim.scenario.schema import Scenario
 from surgsim.scenario.validate import validate
+from surgsim.scenario.wording import one_line
 from surgsim.scenario.yaml_text import YamlDocument, read_yaml, set_value
 
 
@@ -27,6 +28,9 @@ def find(name: str, folder: str, kind: str) -> Path:
     if name in shipped(folder):
         return shipped(folder)[name]
     path = Path(name)
+    group, _, inner = name.partition("/")
+    if not folder and group == "safety" and inner in shipped(group):
+        return shipped(group)[inner]
     if path.suffix in (".yaml", ".yml") or len(path.parts) > 1:
         return path
     raise ScenarioError("", f"{unknown_name(name, f'shipped {kind}', shipped(folder))} Or give a .yaml file.")
@@ -59,6 +63,10 @@ def load_scenario(
     if seed is not None:
         if seed < 0:
             raise ScenarioError("--seed", f"{seed} is not allowed: must be 0 or more")
+        if seed >= 2**63:
+            raise ScenarioError(
+                "--seed", f"{one_line(str(seed))} is out of range: an integer has at most 63 bits"
+            )
         document = set_value(document, f"seed={seed}")
     return validate(Scenario, document)
 

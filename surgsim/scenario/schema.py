@@ -2,33 +2,25 @@
 
 import hashlib
 import json
-import re
 from typing import Annotated, Any, Literal, Self
 
 import numpy as np
-from pydantic import AfterValidator, Field, NonNegativeInt, PositiveFloat, model_validator
+from pydantic import Field, NonNegativeInt, PositiveFloat, model_validator
 
-from surgsim.catalog import PartConfig
+from surgsim.catalog import Name, PartConfig
 from surgsim.control.controller import ControllerConfig
 from surgsim.models.config import InstrumentConfig, RobotConfig, SceneConfig, TrocarConfig, Vec7
 from surgsim.plant import PLANTS
 from surgsim.plant.disturbances import DISTURBANCES
-from surgsim.plant.disturbances.base import Disturbance
 from surgsim.plant.dynamic import DynamicPlantConfig
+from surgsim.plant.part import PlantPart
+from surgsim.plant.props import PROPS
 from surgsim.tasks import TASKS
 
 AnyTask: Any = TASKS.union()
 AnyPlant: Any = PLANTS.union()
 AnyDisturbance: Any = DISTURBANCES.union()
-
-
-def _check_name(name: str) -> str:
-    if not re.fullmatch(r"[a-z0-9][a-z0-9_]{0,63}", name):
-        raise ValueError(f"'{name}' must be lower-case letters, digits and underscores, at most 64")
-    return name
-
-
-Name = Annotated[str, AfterValidator(_check_name)]
+AnyProp: Any = PROPS.union()
 
 
 class StartConfig(PartConfig):
@@ -65,20 +57,45 @@ class SimulationConfig(PartConfig):
         return self
 
 
+class StopConfig(PartConfig):
+    """How an arm is brought to rest and held after an outcome that stops it.
+
+    Attributes:
+        duration_s: How long the run is recorded on [s]; 0: not at all.
+        torque_share: Share of the torque beyond what holds the arm that it brakes with.
+        stiffness_per_s2: Proportional gain about the stopping motion, per unit inertia [1/s^2].
+    """
+
+    duration_s: Annotated[float, Field(ge=0.0, le=60.0)] = 0.5
+    torque_share: Annotated[float, Field(gt=0.0, le=1.0)] = 0.3
+    stiffness_per_s2: PositiveFloat = 2500.0
+
+
 class SafetyConfig(PartConfig):
     """Limits past which a run is stopped, as an outcome; null switches one off.
 
     Attributes:
         rcm_error_max_m: Distance of the shaft from the trocar [m].
         tip_error_max_m: Distance of the tip from its command [m].
+        trocar_force_max_n: Force of the shaft on the abdominal wall [N]; needs `trocar.wall`.
+        tip_force_max_n: Force of the surroundings on the tip [N]; needs something that can touch it.
+        stop_at_collision: Whether contact of the arm with itself, the patient or the table ends the run.
         stop_at_joint_limit: Whether leaving the joint range ends the run.
         stop_at_velocity_limit: Whether exceeding a joint velocity limit ends the run.
+        infeasible_ticks_max: Ticks in a row without an answer of the controller over which the arm is braked
+            before that ends the run.
+        stop: How the arm is stopped; null: the recording ends with the outcome.
     """
 
     rcm_error_max_m: PositiveFloat | None = 0.05
     tip_error_max_m: PositiveFloat | None = None
+    trocar_force_max_n: PositiveFloat | None = None
+    tip_force_max_n: PositiveFloat | None = None
+    stop_at_collision: bool = True
     stop_at_joint_limit: bool = True
     stop_at_velocity_limit: bool = True
+    infeasible_ticks_max: Annotated[int, Field(ge=0, le=1000)] = 0
+    stop: StopConfig | None = StopConfig()
 
 
 class RecordingConfig(PartConfig):
@@ -107,6 +124,7 @@ class Scenario(PartConfig):
     controller: ControllerConfig
     plant: AnyPlant = DynamicPlantConfig()
     disturbances: tuple[AnyDisturbance, ...] = ()
+    props: tuple[AnyProp, ...] = ()
     simulation: SimulationConfig = SimulationConfig()
     safety: SafetyConfig = SafetyConfig()
     recording: RecordingConfig = RecordingConfig()
@@ -123,10 +141,21 @@ class Scenario(PartConfig):
             raise ValueError("give task.start_m, or start.q_rad where the path then begins")
         if self.plant.uses_torque and self.controller.torque_law is None:
             raise ValueError(f"plant '{self.plant.type}' needs controller.torque_law")
+        if self.task.type == "teleoperation":
+            self.task.check(self.simulation.control_period_s, self.props)
         for disturbance in self.disturbances:
             disturbance.check(self.simulation.control_period_s)
-        if self.disturbances and not self.plant.uses_torque:
-            raise ValueError(f"disturbances do not act on the '{self.plant.type}' plant: leave them out")
+        for key in ("disturbances", "props"):
+            if getattr(self, key) and not self.plant.uses_torque:
+                raise ValueError(f"{key} do not act on the '{self.plant.type}' plant: leave them out")
+        if self.trocar is not None and self.trocar.wall is not None:
+            if not self.plant.uses_torque:
+                raise ValueError(f"a trocar.wall does not act on the '{self.plant.type}' plant: leave it out")
+            self.trocar.wall.check(self.simulation.timestep_s)
+        if self.controller.port.type == "interaction_force" and (
+            self.trocar is None or self.trocar.wall is None
+        ):
+            raise ValueError("controller.port 'interaction_force' feels no wall: give trocar.wall")
         return self
 
     @property
@@ -140,15 +169,20 @@ class Scenario(PartConfig):
             timestep_s=self.simulation.timestep_s,
         )
 
-    def build_disturbances(self) -> list[Disturbance]:
-        """The disturbances, each with values drawn from its own child of the seed."""
-        children = np.random.SeedSequence(self.seed, spawn_key=(0,)).spawn(len(self.disturbances))
-        pairs = zip(self.disturbances, children, strict=True)
+    def build_parts(self) -> list[PlantPart]:
+        """Disturbances, then props, each with values drawn from its own child of the seed."""
+        configs = (*self.disturbances, *self.props)
+        children = np.random.SeedSequence(self.seed, spawn_key=(0,)).spawn(len(configs))
+        pairs = zip(configs, children, strict=True)
         return [config.build(np.random.default_rng(child)) for config, child in pairs]
 
     def run_seed(self) -> np.random.SeedSequence:
         """Where the randomness during a run comes from."""
         return np.random.SeedSequence(self.seed, spawn_key=(1,))
+
+    def task_seed(self) -> np.random.SeedSequence:
+        """Where the randomness of a task comes from, e.g. of a simulated operator."""
+        return np.random.SeedSequence(self.seed, spawn_key=(2,))
 
     def resolved(self) -> dict[str, Any]:
         """Every key with its value, as plain data that loads to the same scenario."""

@@ -22,6 +22,7 @@ from surgsim.scenario.yaml_text import YamlDocument
 M = TypeVar("M", bound=PartConfig)
 
 _ABSENT = object()
+_LEAST, _MOST = 1e-30, 1e15
 _MOST_WORDED = 100
 _LONGEST = 400
 _TYPE_CODES = ("int_from_float", "too_short", "too_long", "literal_error", "missing", "extra_forbidden")
@@ -59,6 +60,7 @@ def validate(model: type[M], document: YamlDocument) -> M:
     Raises:
         ScenarioError: For the top-most problem, with the number of further ones.
     """
+    _check_magnitudes(document)
     try:
         return model.model_validate_json(json.dumps(document.tree), strict=True)
     except ValidationError as error:
@@ -69,12 +71,37 @@ def validate(model: type[M], document: YamlDocument) -> M:
         raise ScenarioError(document.where(first.path), _word(first) + more) from error
 
 
+def _check_magnitudes(document: YamlDocument) -> None:
+    """Refuse numbers whose square, or the product of a few, would leave double precision.
+
+    Raises:
+        ScenarioError: For the first one.
+    """
+    for path, value in _numbers(document.tree):
+        if value and not _LEAST <= abs(value) <= _MOST:
+            reason = (
+                f"{value:g} is not allowed: the size of a number must be 0, or from {_LEAST:g} to {_MOST:g}"
+            )
+            raise ScenarioError(document.where(path), reason)
+
+
+def _numbers(tree: Any, path: KeyPath = ()) -> Iterator[tuple[KeyPath, float]]:
+    """Every number with a fraction or exponent, and its place."""
+    for key, value in tree.items() if isinstance(tree, dict) else enumerate(tree):
+        if isinstance(value, float):
+            yield (*path, key), value
+        elif isinstance(value, dict | list):
+            yield from _numbers(value, (*path, key))
+
+
 def _problems(model: type[M], document: YamlDocument, error: ValidationError) -> Iterator[Problem]:
     """All problems in document order, with those left out that follow from another."""
     rank = {path: index for index, path in enumerate(_paths(document.tree))}
     found: dict[tuple[KeyPath, str], Problem] = {}
     for item in error.errors(include_url=False, include_input=False):
         problem = _locate(model, document.tree, item)
+        if _is_long_enough(problem):  # its items are at fault, and are problems of their own
+            continue
         slot = (problem.path, "" if problem.shape.is_union else problem.code)
         if slot not in found or _is_type_code(found[slot].code):
             found[slot] = problem
@@ -82,6 +109,12 @@ def _problems(model: type[M], document: YamlDocument, error: ValidationError) ->
     unknown = (problem for problem in ordered if problem.code == "extra_forbidden")
     renamed = {(*problem.path[:-1], _meant(problem)) for problem in islice(unknown, _MOST_WORDED)}
     yield from (item for item in ordered if not (item.code == "missing" and item.path in renamed))
+
+
+def _is_long_enough(problem: Problem) -> bool:
+    """Whether a list is called too short that is not: pydantic counts the valid items alone."""
+    least = problem.context.get("min_length", 0)
+    return problem.code == "too_short" and isinstance(problem.value, list) and 0 < least <= len(problem.value)
 
 
 def _paths(tree: Any, path: KeyPath = ()) -> Iterator[KeyPath]:
@@ -190,7 +223,7 @@ def _meant(problem: Problem) -> str | None:
 
 
 def _unknown_key(problem: Problem) -> str:
-    meant = _meant(problem)
+    meant = _meant(problem) or _near(problem.path[-1], problem.parent.fields())
     hint = f" Did you mean '{meant}'?" if meant else ""
     allowed = ", ".join(problem.parent.fields()) or "none"
     return f"unknown key (value {_shown(problem)}). Allowed: {allowed}.{hint}"
@@ -212,6 +245,9 @@ def _not_a(problem: Problem, names: list[Any]) -> str:
     value = show(problem.value)[1:-1]
     if problem.path[-1:] == ("type",):
         return unknown_name(value, problem.parent.title or "known type", map(str, names))
+    if problem.value in map(str, names):
+        allowed = ", ".join(map(str, names))
+        return f"{show_with_kind(problem.value)} is not allowed. Allowed: {allowed}, unquoted."
     near = _near(problem.value, names)
     hint = f" Did you mean '{near}'?" if near else ""
     return f"'{value}' is not allowed. Allowed: {', '.join(map(str, names))}.{hint}"

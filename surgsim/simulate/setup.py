@@ -17,6 +17,8 @@ from surgsim.simulate.start import Reach, check_path, check_through_port, solve_
 from surgsim.tasks.base import Task
 
 Array = NDArray[np.float64]
+MOST_TICKS = 4_000_000
+MOST_STEPS = 200_000_000
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -49,16 +51,17 @@ def prepare(scenario: Scenario) -> Setup:
         UnreachableError: If start or path cannot be reached through the trocar.
         SurgsimError: If the model does not compile.
     """
-    disturbances = scenario.build_disturbances()
+    parts = scenario.build_parts()
     arm = ArmModel(scenario.scene)
     q_start = _start_of(_start_key(scenario))
-    task = scenario.task.build(_path_start(scenario, arm))
+    period = scenario.simulation.control_period_s
+    task = _build_task(scenario, _path_start(scenario, arm))
+    _check_length(scenario, task)
     try:
-        scene = build(scenario.scene, disturbances, drawn=False)
+        scene = build(scenario.scene, parts, drawn=False)
     except ValueError as error:
         raise SurgsimError(f"{scenario.name}: MuJoCo refuses the model: {error}") from error
-    period = scenario.simulation.control_period_s
-    plant = scenario.plant.build(scene, period, disturbances, scenario.run_seed())
+    plant = scenario.plant.build(scene, period, parts, scenario.run_seed())
     controller = Controller(
         scenario.controller,
         arm,
@@ -75,6 +78,45 @@ def prepare(scenario: Scenario) -> Setup:
         controller=controller,
         q_start=q_start,
     )
+
+
+def _build_task(scenario: Scenario, start: Array) -> Task:
+    """The task, its path beginning at `start` (3,) [m].
+
+    Raises:
+        SurgsimError: If it enters a port and there is none, or starts beside it.
+    """
+    config, period = scenario.task, scenario.simulation.control_period_s
+    if not _enters_port(scenario):
+        built: Task = config.build(start, period, scenario.task_seed())
+        return built
+    if scenario.trocar is None:
+        raise SurgsimError(f"{scenario.name}: task '{config.type}' needs a trocar")
+    try:
+        built = config.build(start, period, scenario.task_seed(), trocar=scenario.trocar)
+    except ValueError as error:
+        raise SurgsimError(f"{scenario.name}: task: {error}") from error
+    return built
+
+
+def _enters_port(scenario: Scenario) -> bool:
+    """Whether the tip starts outside the patient."""
+    return bool(getattr(scenario.task, "enters_port", False))
+
+
+def _check_length(scenario: Scenario, task: Task) -> None:
+    """Refuse a run that no memory holds, or whose end nobody would see."""
+    counts = (
+        ("control ticks", scenario.simulation.control_period_s, MOST_TICKS),
+        ("time steps", scenario.simulation.timestep_s, MOST_STEPS),
+    )
+    for what, step_s, most in counts:
+        count = task.duration_s / step_s
+        if count > most:
+            raise SurgsimError(
+                f"{scenario.name}: the task lasts {task.duration_s:g} s, {count:.3g} {what} "
+                f"of {step_s:g} s; at most {most:.0e} are allowed"
+            )
 
 
 def _path_start(scenario: Scenario, arm: ArmModel) -> Array:
@@ -99,13 +141,15 @@ def _start_of(scenario_json: str) -> Array:
     given, p_start = scenario.start.q_rad, _path_start(scenario, arm)
     try:
         if scenario.trocar is not None:
-            check_through_port(p_start, "the start at", scenario.instrument, scenario.trocar)
+            entering = _enters_port(scenario)
+            check_through_port(p_start, "the start at", scenario.instrument, scenario.trocar, entering)
         if given is None:
             q = solve_start(reach, arm, p_start, _posture(scenario, arm))
         else:
             q = _checked_start(reach, arm, np.array(given), p_start)
         if scenario.trocar is not None:
-            check_path(reach, scenario.task.build(p_start), q, scenario.instrument, scenario.trocar)
+            task = _build_task(scenario, p_start)
+            check_path(reach, task, q, scenario.instrument, scenario.trocar, entering=_enters_port(scenario))
     except UnreachableError as error:
         raise UnreachableError(f"{scenario.name}: {error}") from error
     q.flags.writeable = False

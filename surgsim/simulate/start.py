@@ -21,7 +21,6 @@ Array = NDArray[np.float64]
 TIP_TOLERANCE_M = 1e-6
 RCM_TOLERANCE_M = 1e-6
 MAX_INCLINATION_RAD = np.deg2rad(80.0)
-_SAMPLES = 200
 _LIMIT_MARGIN_RAD = 0.01
 
 
@@ -108,6 +107,9 @@ def solve_start(reach: Reach, arm: ArmModel, p_WT: Array, posture: Array) -> Arr
         guess[0] += turn
         q = reach.solve(p_WT, guess, posture, 200)
         tip, rcm = reach.miss(q, p_WT)
+        if TIP_TOLERANCE_M <= tip < 1e-4:  # the posture's pull is left
+            q = reach.solve(p_WT, q, q, 50)
+            tip, rcm = reach.miss(q, p_WT)
         if tip < TIP_TOLERANCE_M and rcm < RCM_TOLERANCE_M:
             return q
         if tip + rcm < best_miss:
@@ -120,19 +122,25 @@ def solve_start(reach: Reach, arm: ArmModel, p_WT: Array, posture: Array) -> Arr
 
 
 def check_path(
-    reach: Reach, task: Task, q_start: Array, instrument: InstrumentConfig | None, trocar: TrocarConfig | None
+    reach: Reach,
+    task: Task,
+    q_start: Array,
+    instrument: InstrumentConfig | None,
+    trocar: TrocarConfig | None,
+    *,
+    entering: bool = False,
 ) -> None:
     """Refuse a path that the instrument cannot follow through the trocar.
+
+    `entering` allows the tip to be on the port's axis outside the patient.
 
     Raises:
         UnreachableError: With the time, the place and the reason.
     """
     q = q_start
-    for t in np.linspace(0.0, task.duration_s, _SAMPLES):
-        p = task.command(float(t)).p_WTd
-        where = f"at t = {t:.2f} s the path point"
+    for where, p in task.reach():
         if trocar is not None:
-            check_through_port(p, where, instrument, trocar)
+            check_through_port(p, where, instrument, trocar, entering)
         q = reach.solve(p, q, q, 10)
         tip, rcm = reach.miss(q, p)
         if tip > 1e-4 or rcm > 1e-4:
@@ -143,16 +151,26 @@ def check_path(
 
 
 def check_through_port(
-    p: Array, what: str, instrument: InstrumentConfig | None, trocar: TrocarConfig
+    p: Array, what: str, instrument: InstrumentConfig | None, trocar: TrocarConfig, entering: bool = False
 ) -> None:
     """Refuse a tip position `p` (3,) [m] that is no pose of the instrument through the port.
+
+    `entering` allows one on the port's axis outside the patient.
 
     Raises:
         UnreachableError: With `what` and the reason.
     """
+    if entering and _above_port(p, trocar):
+        return
     reason = None if instrument is None else _outside_port(p, instrument, trocar)
     if reason:
         raise UnreachableError(f"{what} {_point(p)} cannot be reached: {reason}")
+
+
+def _above_port(p: Array, trocar: TrocarConfig) -> bool:
+    r, axis = p - np.array(trocar.position_m), unit(np.array(trocar.axis))
+    height = float(r @ axis)
+    return height >= 0.0 and float(np.linalg.norm(r - height * axis)) < 1e-3
 
 
 def _outside_port(p: Array, instrument: InstrumentConfig, trocar: TrocarConfig) -> str | None:

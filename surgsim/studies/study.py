@@ -11,7 +11,7 @@ Row = Mapping[str, Cell]
 Progress = Callable[[str], None]
 """Called with a line about what is being done."""
 
-Verdict = Literal["holds", "does not hold", "depends"]
+Verdict = Literal["holds", "does not hold", "depends", "not comparable"]
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -9,11 +9,26 @@ from numpy.typing import NDArray
 from pydantic import Field, NonNegativeFloat, PositiveFloat, model_validator
 
 from surgsim.catalog import PartConfig
+from surgsim.columns import Block
 from surgsim.models.config import Vec3
 from surgsim.spatial import plane_axes
 from surgsim.tasks.profile import Profile
 
 Array = NDArray[np.float64]
+_REACH_SAMPLES = 200
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class EnergyBudget:
+    """What a passive controller may give to the surroundings in one period.
+
+    Attributes:
+        most_j: T(x_t) - epsilon of the remote energy tank [J].
+        f_T: Measured force of the surroundings on the tip, world frame (3,) [N].
+    """
+
+    most_j: float
+    f_T: Array
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -24,24 +39,116 @@ class TipCommand:
         p_WTd: Position (3,) [m].
         v_WTd: Velocity (3,) [m/s].
         a_WTd: Acceleration (3,) [m/s^2].
+        roll_rate: Turn about the shaft, positive from the adapter to the tip [rad/s].
+        jaw: How far the instrument's jaws close, from 0 (open) to 1.
+        budget: Energy that the controller may spend; None: it is not limited.
+        rcm_shift: From the trocar to the point that the shaft is held through in its place (3,) [m]; None:
+            the trocar.
+        rcm_shift_rate: Its rate of change (3,) [m/s].
     """
 
     p_WTd: Array
     v_WTd: Array
     a_WTd: Array
+    roll_rate: float = 0.0
+    jaw: float = 0.0
+    budget: EnergyBudget | None = None
+    rcm_shift: Array | None = None
+    rcm_shift_rate: Array | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Feedback:
+    """What a task that reacts is told at a tick: the instrument as measured.
+
+    Attributes:
+        p_WT: Tip position (3,) [m].
+        v_WT: Tip velocity (3,) [m/s].
+        R_WT: Tip orientation (3, 3), third column along the shaft.
+        w_WT: Angular velocity of the instrument (3,) [rad/s].
+        f_T: Measured force of the surroundings on the tip (3,) [N].
+    """
+
+    p_WT: Array
+    v_WT: Array
+    R_WT: Array
+    w_WT: Array
+    f_T: Array
 
 
 class Task(Protocol):
-    """Desired tip motion over time."""
+    """Desired tip motion over time.
+
+    `command` is called once a tick, in order of time, after `reset`. A task whose `reacts` is true is given
+    feedback; the others are functions of time alone.
+    """
 
     @property
     def duration_s(self) -> float:
-        """Length of the whole task [s]."""
+        """Length of the whole task, or the longest that it may take [s]."""
         ...
 
-    def command(self, t_s: float) -> TipCommand:
+    @property
+    def reacts(self) -> bool:
+        """Whether it needs feedback."""
+        ...
+
+    @property
+    def columns(self) -> tuple[Block, ...]:
+        """What it adds to the trace."""
+        ...
+
+    def reach(self) -> list[tuple[str, Array]]:
+        """Places (3,) [m] that the tip must be able to reach, in order, each with its name for messages."""
+        ...
+
+    def reset(self) -> None:
+        """Forget the last run."""
+        ...
+
+    def command(self, t_s: float, feedback: Feedback | None = None) -> TipCommand:
         """Desired tip motion at `t_s` [s]."""
         ...
+
+    def values(self) -> Array:
+        """Values of `columns` at the last command."""
+        ...
+
+    def finished(self, t_s: float) -> bool:
+        """Whether there is nothing left to do at `t_s` [s], before `duration_s`."""
+        ...
+
+
+class TimedTask(ABC):
+    """A task whose command is a function of time alone."""
+
+    reacts = False
+    columns: tuple[Block, ...] = ()
+
+    @property
+    @abstractmethod
+    def duration_s(self) -> float:
+        """Length of the whole task [s]."""
+
+    @abstractmethod
+    def command(self, t_s: float, feedback: Feedback | None = None) -> TipCommand:
+        """Desired tip motion at `t_s` [s]."""
+
+    def reach(self) -> list[tuple[str, Array]]:
+        """Points along the path."""
+        times = np.linspace(0.0, self.duration_s, _REACH_SAMPLES)
+        return [(f"at t = {t:.2f} s the path point", self.command(float(t)).p_WTd) for t in times]
+
+    def reset(self) -> None:  # noqa: B027 - a function of time has nothing to forget
+        """Forget the last run."""
+
+    def values(self) -> Array:
+        """No columns."""
+        return np.zeros(0)
+
+    def finished(self, t_s: float) -> bool:
+        """It takes its time."""
+        return False
 
 
 class PathTaskConfig(PartConfig, ABC):
@@ -76,8 +183,10 @@ class PathTaskConfig(PartConfig, ABC):
     def shape(self, s: float) -> Array:
         """Rows point [m], first and second derivative by s (3, 3), in path axes, from the origin at s = 0."""
 
-    def build(self, start: Array) -> "PathTask":
-        """The task, with its path beginning at `start` (3,) [m]."""
+    def build(
+        self, start: Array, period_s: float = 0.001, seed: np.random.SeedSequence | None = None
+    ) -> "PathTask":
+        """The task, with its path beginning at `start` (3,) [m]; period and seed are for tasks that react."""
         profile = Profile(
             hold_start_s=self.hold_start_s,
             duration_s=self.duration_s,
@@ -88,7 +197,7 @@ class PathTaskConfig(PartConfig, ABC):
         return PathTask(shape=self, profile=profile, start=np.array(start), R_WP=np.column_stack(axes))
 
 
-class PathTask:
+class PathTask(TimedTask):
     """A path shape followed with a smooth profile."""
 
     def __init__(self, *, shape: PathTaskConfig, profile: Profile, start: Array, R_WP: Array) -> None:
@@ -102,7 +211,7 @@ class PathTask:
         """Length of the whole task [s]."""
         return self._profile.total_s
 
-    def command(self, t_s: float) -> TipCommand:
+    def command(self, t_s: float, feedback: Feedback | None = None) -> TipCommand:
         """Desired tip motion at `t_s` [s]: p(s), p' s', p'' s'^2 + p' s''."""
         s, s_dot, s_ddot = self._profile.progress(t_s)
         p, dp, ddp = self._shape.shape(s) @ self._R_PW

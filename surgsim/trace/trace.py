@@ -8,52 +8,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from surgsim.columns import Block, joints, scalar, vector
 from surgsim.errors import Outcome
 
 Array = NDArray[np.float64]
 
-JOINTS = tuple(str(i + 1) for i in range(7))
-AXES = ("x", "y", "z")
 TIMING_COLUMNS = ("control_time_s",)
 """Columns that measure the machine, not the experiment: they differ between two equal runs."""
-
-
-@dataclass(frozen=True)
-class Block:
-    """Columns that belong together, e.g. the seven joint positions.
-
-    Attributes:
-        name: Stem of the columns' names.
-        labels: What tells them apart: joints `1`..`7`, axes `x`, `y`, `z`, or one empty label.
-        unit: SI unit suffix, empty for a pure number.
-    """
-
-    name: str
-    labels: tuple[str, ...]
-    unit: str
-
-    @property
-    def columns(self) -> tuple[str, ...]:
-        """Column names, e.g. `q1_rad`, `tip_x_m`, `manipulability`."""
-        joiner = "" if self.labels == JOINTS else "_"
-        stems = [f"{self.name}{joiner}{label}" if label else self.name for label in self.labels]
-        return tuple(f"{stem}_{self.unit}" if self.unit else stem for stem in stems)
-
-
-def joints(name: str, unit: str) -> Block:
-    """Block of seven joint columns."""
-    return Block(name, JOINTS, unit)
-
-
-def vector(name: str, unit: str) -> Block:
-    """Block of x, y and z."""
-    return Block(name, AXES, unit)
-
-
-def scalar(name: str, unit: str = "") -> Block:
-    """Block of one column."""
-    return Block(name, ("",), unit)
-
 
 BASE_BLOCKS = (
     scalar("t", "s"),
@@ -73,8 +34,11 @@ BASE_BLOCKS = (
     scalar("resolver_residual", "m_per_s"),
     scalar("saturated_joints"),
     scalar("control_time", "s"),
+    scalar("infeasible"),
+    scalar("stopped"),
 )
-"""Columns that every trace has. `tau_<term>` blocks, one per term of the torque law, follow."""
+"""Columns that every trace has. `tau_<term>` blocks, one per term of the torque law, follow, then what task,
+controller and plant add."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -210,10 +174,33 @@ class Trace:
         """One column (rows,)."""
         return self._data[:, self._index[column]]
 
+    def __contains__(self, block: str) -> bool:
+        """Whether there is a block of that name."""
+        return block in self._blocks
+
     def block(self, name: str) -> Array:
         """A block's columns (rows, width)."""
         first = self._index[self._blocks[name].columns[0]]
         return self._data[:, first : first + len(self._blocks[name].columns)]
+
+    def active(self) -> "Trace":
+        """The run itself: this trace without the rows of the stop that followed its outcome."""
+        return self._rows(~self._stopped) if self._stopped.any() else self
+
+    def stop(self) -> "Trace":
+        """The row at which the run was stopped, and all of the stop that followed; no rows without one."""
+        first = len(self) - int(np.count_nonzero(self._stopped))
+        return self._rows(np.arange(len(self)) >= (first - 1 if first < len(self) else first))
+
+    @property
+    def _stopped(self) -> NDArray[np.bool_]:
+        """Which rows belong to the stop (rows,)."""
+        if "stopped" not in self:
+            return np.zeros(len(self), dtype=bool)
+        return np.asarray(self["stopped"] == 1.0)
+
+    def _rows(self, mask: NDArray[np.bool_]) -> "Trace":
+        return Trace(self._data[mask], self.blocks, self.meta)
 
     def equals(self, other: "Trace") -> bool:
         """Whether both hold the same experiment bit for bit; machine timings are left out."""

@@ -143,7 +143,7 @@ def alive(pid):
 
 WRONG = {
     "suite and scenario": (["quick", "circle_lwr4plus"], "give one suite, or scenarios; not both"),
-    "neither": (["nonsense"], "'nonsense' is not a shipped scenario. Known: circle_lwr4plus, "),
+    "neither": (["nonsense"], "'nonsense' is not a shipped scenario. Known: "),
     "no file": (["nothing.yaml"], "nothing.yaml: cannot be read: "),
     "controller": (["quick", "--controllers", "vprn"], "--controller: 'vprn' is not a shipped controller."),
     "seeds": (["quick", "--seeds", "x"], "--seeds: 'x' is not a list of seeds: write 0:10, 3 or 1,4,9"),

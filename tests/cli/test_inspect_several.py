@@ -1,20 +1,28 @@
 """`surgsim inspect` with two recordings, and with a batch's folder."""
 
 import json
+import math
 import shutil
 from pathlib import Path
 
+import pyarrow as pa
 import pytest
 from rerun.chunk import RrdReader
 
+from surgsim.cli.inspect import _largest_gap_mm
 from surgsim.cli.main import main
+from surgsim.cli.output import format_number
 from surgsim.compare.engine import Batch, compare
 from surgsim.compare.job import do
 from surgsim.compare.suite import SuiteConfig
+from surgsim.compare.table import read_table
 from surgsim.compare.workers import Done
 from surgsim.metrics.catalog import METRICS
 from surgsim.metrics.timing import TIMING_METRICS
 from surgsim.recording.layout import HEADER, SERIES, TIMELINE
+from surgsim.recording.read import read_recording
+from surgsim.recording.sealed import read_sealed, sealed
+from surgsim.trace.trace import Trace
 
 SETTINGS = (
     "theatre=false",
@@ -90,11 +98,7 @@ def test_out_writes_both_on_one_timeline(runs, capsys, tmp_path):
     alone = [contents(Path(run) / "recording.rrd") for run in runs]
     for side, (own_paths, own_ticks) in zip("ab", alone, strict=True):
         assert len(own_ticks) > 5
-        shown = {
-            f"/{side}{path}"
-            for path in own_paths
-            if not path.startswith((f"/{HEADER}", "/__", "/summary/", "/log"))
-        }
+        shown = {f"/{side}{path}" for path in own_paths if not path.startswith((f"/{HEADER}", "/__"))}
         assert shown == {path for path in paths if path.startswith(f"/{side}/")}
         mine = {path: n for path, n in ticks.items() if path.startswith(f"/{side}/")}
         assert mine == {f"/{side}{path}": n for path, n in own_ticks.items()}
@@ -155,8 +159,98 @@ def test_what_is_wrong_is_one_line(batch, runs, capsys, tmp_path):
         assert (out, error) == ("", f"surgsim: {text}\n")
 
 
-def test_a_run_without_recording_says_so(batch, capsys, tmp_path):
+def said(command, capsys):
+    """Standard error of a command that is refused."""
+    assert main(command) == 2
+    out, error = capsys.readouterr()
+    assert (out, error.count("\n")) == ("", 1)
+    return error
+
+
+def write_command(folder, command):
+    about = read_sealed(folder / "suite.json")
+    (folder / "suite.json").write_text(json.dumps(sealed({**about, "command": command})))
+
+
+@pytest.fixture
+def copy(batch, tmp_path):
+    """A copy of the batch that may be spoilt, made by a command of its own."""
     copy = shutil.copytree(batch, tmp_path / "copy")
+    write_command(copy, "surgsim compare pair.yaml --out 'my runs' --resume")
+    return copy
+
+
+def test_a_run_without_recording_says_how_to_record_it(copy, capsys):
     (copy / "runs" / A / "recording.rrd").unlink()
-    assert main(["inspect", str(copy), "--run", A]) == 2
-    assert "recording.rrd" in capsys.readouterr().err
+    assert said(["inspect", str(copy), "--run", A], capsys) == (
+        f"surgsim: {A} was not recorded. To record every run: surgsim compare pair.yaml --out 'my runs' "
+        f"--resume --record. To record this one: surgsim run {copy}/runs/{A}/scenario.yaml --out DIR\n"
+    )
+    write_command(copy, "")
+    assert f"surgsim compare SUITE --out {copy} --resume --record." in said(
+        ["inspect", str(copy), "--run", A], capsys
+    )
+
+
+@pytest.mark.parametrize("more", [[], ["--run", A], ["--json"]])
+def test_a_batch_that_is_not_finished_says_how_to_go_on(copy, capsys, more):
+    (copy / "runs.parquet").unlink()
+    (copy / "runs" / B / "metrics.json").unlink()
+    assert said(["inspect", str(copy), *more], capsys) == (
+        f"surgsim: {copy}: the batch is not finished: 1 run there, no table yet. "
+        "To go on: surgsim compare pair.yaml --out 'my runs' --resume\n"
+    )
+
+
+@pytest.fixture
+def listed(copy, monkeypatch):
+    """Rows of the batch's table with changes, which `inspect` will read in place of its own."""
+
+    def change(changes):
+        table = read_table(copy)
+        rows = [{**row, **changes(row)} for row in table.to_pylist()]
+        changed = pa.Table.from_pylist(rows, schema=table.schema)
+        monkeypatch.setattr("surgsim.compare.table.read_table", lambda root: changed)
+        return rows
+
+    return change
+
+
+def test_long_names_are_listed_whole(copy, listed, capsys):
+    """On a line of their own, so that they can be copied, though numbers stand beside them."""
+    rows = listed(lambda row: {"run_id": f"{row['run_id']}/{'x' * 150}"})
+    assert main(["inspect", str(copy)]) == 0
+    out = capsys.readouterr().out
+    for row in rows:
+        line = next(line for line in out.splitlines() if line.startswith(row["run_id"]))
+        figures = [row[key] for key in ("tip_error_rms_mm", "rcm_error_rms_mm", "rcm_error_max_mm")]
+        assert [float(word) for word in line.split()[2:]] == pytest.approx(figures, rel=1e-3)
+
+
+def test_a_batch_without_recordings_says_how_to_record_them(copy, listed, capsys):
+    listed(lambda row: {"recording": None})
+    assert main(["inspect", str(copy)]) == 0
+    said = "none was recorded; to record them: surgsim compare pair.yaml --out 'my runs' --resume --record"
+    assert capsys.readouterr().out.splitlines()[-1] == said
+
+
+@pytest.mark.parametrize(("gap_m", "text"), [(0.0, "0"), (3e-17, "3.000e-14"), (0.002, "2.000")])
+def test_the_distance_of_the_tips_is_told_however_small(runs, gap_m, text):
+    still, moved = (tip_traces(read_recording(Path(runs[0])).trace, x) for x in (0.0, gap_m))
+    assert format_number(_largest_gap_mm(still, moved)) == text
+
+
+def test_ticks_at_which_a_tip_is_not_finite_do_not_count(runs):
+    trace = read_recording(Path(runs[0])).trace
+    still, moved = tip_traces(trace, 0.0), tip_traces(trace, 0.002, broken=1)
+    assert _largest_gap_mm(still, moved) == pytest.approx(2.0)
+    assert _largest_gap_mm(still, tip_traces(trace, 0.0, broken=len(trace))) is None
+
+
+def tip_traces(trace, x_m, broken=0):
+    """`trace` with its tip at `x_m` on the x axis, but for the last `broken` ticks, where it is nowhere."""
+    data = trace.data.copy()
+    first = trace.columns.index("tip_x_m")
+    data[:, first : first + 3] = (x_m, 0.0, 0.0)
+    data[len(data) - broken :, first] = math.nan
+    return Trace(data, trace.blocks, trace.meta)

@@ -11,8 +11,9 @@ import pyarrow.parquet
 import pytest
 
 from surgsim.compare.observations import Observations
-from surgsim.compare.table import schema
+from surgsim.compare.table import schema, sealed_table
 from surgsim.metrics.catalog import METRICS
+from surgsim.recording.sealed import sealed
 
 PLAIN = {
     "scenarios": ("circle_lwr4plus", "spiral_lwr4plus", "sinusoid_lwr4plus"),
@@ -112,7 +113,7 @@ def make_results(root: Path, names: dict[str, Any] = PLAIN, seeds: int = 10) -> 
 def write_results(root: Path, rows: list[dict[str, Any]], names: dict[str, Any] = PLAIN) -> None:
     """Write the table and `suite.json`."""
     root.mkdir(parents=True, exist_ok=True)
-    pa.parquet.write_table(pa.Table.from_pylist(rows, schema=schema()), root / "runs.parquet")
+    pa.parquet.write_table(sealed_table(pa.Table.from_pylist(rows, schema=schema())), root / "runs.parquet")
     suite = {
         "name": "made",
         "description": "made-up <results> & more",
@@ -123,7 +124,7 @@ def write_results(root: Path, rows: list[dict[str, Any]], names: dict[str, Any] 
         "seeds": "0:10",
         "provenance": {**VERSIONS, "commit": "0123456789abcdef"},
     }
-    (root / "suite.json").write_text(json.dumps(suite))
+    (root / "suite.json").write_text(json.dumps(sealed(suite)))
 
 
 @pytest.fixture(scope="session")

@@ -21,6 +21,7 @@ from surgsim.compare.suite import SuiteConfig
 from surgsim.compare.table import MACHINE_COLUMNS, read_table
 from surgsim.compare.workers import Done, run_jobs
 from surgsim.errors import SurgsimError
+from surgsim.recording.sealed import read_sealed, sealed
 
 SHORT = (
     "theatre=false",
@@ -44,6 +45,7 @@ from pathlib import Path
 from surgsim.compare.engine import Batch, compare
 from surgsim.compare.suite import SuiteConfig
 from surgsim.errors import SurgsimError
+from surgsim.recording.sealed import read_sealed, sealed
 
 if __name__ == "__main__":
     suite = SuiteConfig.model_validate_json(sys.argv[1])
@@ -169,10 +171,10 @@ def lose_folder(folder):
 
 
 def change(folder, key, value):
-    summary = json.loads((folder / "metrics.json").read_text())
+    summary = read_sealed(folder / "metrics.json")
     summary["provenance"][key] = value
     summary["metrics"]["tip_error_rms_mm"] = 1e9
-    (folder / "metrics.json").write_text(json.dumps(summary))
+    (folder / "metrics.json").write_text(json.dumps(sealed(summary)))
 
 
 @pytest.mark.parametrize(

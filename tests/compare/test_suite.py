@@ -171,7 +171,7 @@ def test_a_wrong_suite_names_file_line_and_key(write, text, message):
     [
         (
             "name: small\nscenarios: [circel_lwr4plus]\n",
-            "'circel_lwr4plus' is not a shipped scenario. Known: circle_lwr4plus, ",
+            "'circel_lwr4plus' is not a shipped scenario. Known: breathing_hidden_lwr4plus, ",
         ),
         (MINIMAL + "controllers: [vprn]\n", "--controller: 'vprn' is not a shipped controller. Known: "),
         (
@@ -251,8 +251,10 @@ def test_every_shipped_suite_can_be_run(name):
 
 def test_the_full_suite_leaves_nothing_out():
     suite, folder = load_suite("full")
-    assert sorted(suite.scenarios) == sorted(shipped())
-    assert sorted(suite.controllers) == sorted(shipped("controllers"))
+    paths = [name for name in shipped() if name.startswith(("circle", "sinusoid", "spiral"))]
+    assert sorted(suite.scenarios) == sorted(paths)
+    elsewhere = {"passive_convex", "rcm_interaction_force"}  # made for an operator, and for a wall
+    assert set(suite.controllers) == set(shipped("controllers")) - elsewhere
     assert len(expand(suite, folder)) == 3600
     assert len(expand(*load_suite("seeds"))) == 480
     assert len(expand(*load_suite("quick"))) == 36

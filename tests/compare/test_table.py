@@ -14,6 +14,7 @@ import pytest
 from surgsim.compare.table import MACHINE_COLUMNS, Row, read_table, schema, write_table
 from surgsim.errors import SurgsimError
 from surgsim.metrics.catalog import METRICS
+from surgsim.recording.sealed import sealed
 
 TEXT = {"run_id", "suite", "scenario", "controller", "parameters", "outcome", "outcome_detail"}
 TEXT |= {"scenario_sha256", "surgsim_version", "commit", "machine", "folder", "recording"}
@@ -47,7 +48,7 @@ def results(tmp_path):
         for i, content in enumerate(summaries):
             folder = tmp_path / "runs" / str(i)
             folder.mkdir(parents=True)
-            (folder / "metrics.json").write_text(json.dumps(content))
+            (folder / "metrics.json").write_text(json.dumps(sealed(content)))
             rows.append(
                 Row(run_id=str(i), suite="small", parameters={"b": [1], "a": "x"}, folder=f"runs/{i}")
             )
@@ -129,9 +130,19 @@ def test_numbers_survive_the_csv_bit_for_bit(results, tmp_path):
     ("text", "reason"),
     [
         ("", "Expecting value"),
-        ('{"scenario": "circle"}', "'outcome'"),
-        ('{"outcome": 1, "provenance": {}}', "'scenario'"),
-        ("[]", "list indices"),
+        ('{"scenario": "circle"}', "it has no sha256"),
+        ('{"scenario": "circle", "sha256": "00"}', "its sha256 differs"),
+        (json.dumps(sealed({"scenario": "circle"})), "'schema_version'"),
+        (
+            json.dumps(sealed({"schema_version": 2, "outcome": {"name": "completed"}})),
+            "schema_version 2, but",
+        ),
+        (
+            json.dumps(sealed({"schema_version": 1, "outcome": {"name": "finished"}})),
+            "is not a run's outcome",
+        ),
+        ("[]", "it holds no object"),
+        ("[" * 100_000, "it is nested too deeply"),
     ],
 )
 def test_a_damaged_metrics_json_is_named(results, tmp_path, text, reason):

@@ -8,6 +8,8 @@ import pytest
 from pydantic import ValidationError
 
 from surgsim.catalog import Catalog
+from surgsim.control.port_estimators import PORT_ESTIMATORS
+from surgsim.control.port_estimators.base import PortProblem
 from surgsim.control.problem import ControlFailure
 from surgsim.control.resolvers import RESOLVERS
 from surgsim.control.torque_laws import TORQUE_LAWS
@@ -15,13 +17,16 @@ from surgsim.models.build import build
 from surgsim.models.config import RobotConfig, SceneConfig, TrocarConfig
 from surgsim.plant import PLANTS
 from surgsim.plant.disturbances import DISTURBANCES
+from surgsim.plant.props import PROPS
 from surgsim.tasks import TASKS
+from surgsim.tasks.base import Feedback
 
-CATALOGS = (RESOLVERS, TORQUE_LAWS, TASKS, DISTURBANCES, PLANTS)
+CATALOGS = (RESOLVERS, TORQUE_LAWS, PORT_ESTIMATORS, TASKS, DISTURBANCES, PROPS, PLANTS)
 PARTS = [(catalog, name) for catalog in CATALOGS for name in catalog.names()]
 every_part = pytest.mark.parametrize(("catalog", "name"), PARTS, ids=[f"{c.kind}-{n}" for c, n in PARTS])
 every_resolver = pytest.mark.parametrize("name", RESOLVERS.names())
 every_law = pytest.mark.parametrize("name", TORQUE_LAWS.names())
+every_estimator = pytest.mark.parametrize("name", PORT_ESTIMATORS.names())
 every_task = pytest.mark.parametrize("name", TASKS.names())
 every_disturbance = pytest.mark.parametrize("name", DISTURBANCES.names())
 trocar_or_none = pytest.mark.parametrize("trocar", [True, False], ids=["trocar", "no trocar"])
@@ -189,9 +194,34 @@ def test_torque_law_holds_an_arm_that_is_where_it_should_be(arm, torque_problem,
     np.testing.assert_allclose(terms.sum(axis=0), dyn.bias, atol=1e-9)
 
 
+@every_estimator
+def test_port_estimators_start_where_the_trocar_is_seen_and_repeat_themselves(arm, velocity_problem, name):
+    p = velocity_problem(0, trocar_speed=0.0)
+    kin, dyn = arm.evaluate(p.q, p.v)
+    problem = PortProblem(
+        t_s=0.0, dt_s=DT, v=p.v, tau_measured=dyn.bias, kin=kin, dyn=dyn, p_WC=p.p_WC, v_WC=p.v_WC
+    )
+    estimator = PORT_ESTIMATORS.config(name)().build(arm)
+
+    def run():
+        memory, out = estimator.start(problem), []
+        for k in range(20):
+            seen = replace(problem, t_s=k * DT, p_WC=problem.p_WC + 1e-5 * k)
+            estimate, memory = estimator.step(seen, memory)
+            out.append([estimate.p_WC, estimate.v_WC, estimate.a_WC])
+        return np.array(out)
+
+    first = run()
+    assert np.isfinite(first).all()
+    np.testing.assert_allclose(first[0, 0], problem.p_WC, atol=1e-12)
+    np.testing.assert_array_equal(run(), first)
+
+
 @every_task
 def test_task_commands_are_finite_and_the_same_at_any_order_of_time(name):
     task = TASKS.config(name)().build(np.array([0.1, 0.5, 0.0]))
+    if task.reacts:
+        pytest.skip("it answers to what happens, in order of time")
     times = np.linspace(0.0, task.duration_s, 23)
 
     def values(order):
@@ -203,6 +233,28 @@ def test_task_commands_are_finite_and_the_same_at_any_order_of_time(name):
     assert np.isfinite(forward).all()
     np.testing.assert_array_equal(values(times[::-1]), forward)
     assert np.ptp(forward[:, 0], axis=0).max() > 1e-4
+
+
+@every_task
+def test_a_task_that_reacts_starts_afresh_and_says_the_same_again(name):
+    start = np.array([0.1, 0.5, 0.0])
+    task = TASKS.config(name)().build(start)
+    if not task.reacts:
+        pytest.skip("it is a function of time alone")
+    feedback = Feedback(p_WT=start, v_WT=np.zeros(3), R_WT=np.eye(3), w_WT=np.zeros(3), f_T=np.zeros(3))
+
+    def run():
+        task.reset()
+        rows = []
+        for k in range(300):
+            command = task.command(DT * k, feedback)
+            rows.append(np.concatenate((command.p_WTd, command.v_WTd, command.a_WTd, task.values())))
+        return np.array(rows)
+
+    first = run()
+    assert first.shape == (300, 9 + sum(len(block.columns) for block in task.columns))
+    assert np.isfinite(first[:, :9]).all()
+    np.testing.assert_array_equal(run(), first)
 
 
 def _plant(*disturbances, seed=3):
@@ -229,7 +281,8 @@ def test_disturbance_is_deterministic_under_a_seed_and_starts_afresh(random_q, n
     assert np.isfinite(first).all()
     np.testing.assert_array_equal(_fall(plant, q), first)
     np.testing.assert_array_equal(_fall(_plant(config.build(np.random.default_rng(0))), q), first)
-    np.testing.assert_array_equal(first[0, :7], q)
+    plant.reset(q)
+    np.testing.assert_array_equal(plant.truth().q, q)
 
 
 @every_disturbance

@@ -75,7 +75,7 @@ def _delays(delay, commands, most=12):
     queue, estimate = [], DelayEstimate.start(most)
     measured, ticks = np.zeros(7), []
     for command in commands:
-        estimate = estimate.update(measured)
+        estimate = estimate.update(measured, 0.001)
         ticks.append(estimate.ticks)
         assert estimate.in_flight.shape == (estimate.ticks, 7)
         estimate = estimate.sent(command)
@@ -91,7 +91,7 @@ def test_delays_are_found_exactly_as_soon_as_they_show(delay):
     ticks, estimate, queue = _delays(delay, commands)
     shown = np.minimum(np.maximum(np.arange(60) - 1, 0), delay)
     np.testing.assert_array_equal(ticks, shown)
-    estimate = estimate.update(commands[-1 - delay])
+    estimate = estimate.update(commands[-1 - delay], 0.001)
     np.testing.assert_array_equal(estimate.in_flight, queue if delay else np.zeros((0, 7)))
 
 
@@ -121,7 +121,7 @@ def test_a_change_of_the_delay_is_followed():
     for k in range(400):
         delay = 2 if k < 200 else 9
         measured = history[max(len(history) - 1 - delay, 0)] if history else np.zeros(7)
-        estimate = estimate.update(measured)
+        estimate = estimate.update(measured, 0.001)
         if k in (199, 399):
             assert estimate.ticks == delay
         history.append(rng.standard_normal(7))
@@ -132,3 +132,19 @@ def test_with_no_delay_allowed_none_is_found():
     ticks, estimate, _ = _delays(5, np.random.default_rng(0).standard_normal((30, 7)), most=0)
     np.testing.assert_array_equal(ticks, 0)
     assert estimate.in_flight.shape == (0, 7)
+
+
+@pytest.mark.parametrize("delay", [0, 4])
+def test_the_mean_offset_of_the_measured_torque_is_found_at_its_rate(delay):
+    rng, bias = np.random.default_rng(1), np.linspace(-1.0, 1.0, 7)
+    estimate, history, offsets = DelayEstimate.start(12), [], []
+    for _ in range(600):
+        sent = history[max(len(history) - 1 - delay, 0)] if history else -bias
+        estimate = estimate.update(sent + bias, DT)
+        offsets.append(estimate.offset)
+        history.append(5.0 * rng.standard_normal(7))
+        estimate = estimate.sent(history[-1])
+    assert estimate.ticks == delay
+    expected = bias * (1.0 - (1.0 - DT / 0.05) ** np.arange(600))[:, None]
+    np.testing.assert_allclose(offsets[-1], bias, atol=1e-3)
+    np.testing.assert_allclose(offsets[300], expected[300], atol=0.1)

@@ -182,7 +182,10 @@ def test_errors_over_time_come_from_recordings(made_results, trace_of, tmp_path,
     monkeypatch.setattr(series, "read_recording", read)
     said: list[str] = []
     text = "".join(Page(write_report(folder, say=said.append).read_text()).text)
-    assert said == ["reading 12 recordings for the figures over time"]
+    assert said == [
+        "reading 12 recordings for the figures over time",
+        "6 recordings could not be read: the figures over time leave them out",  # 4 of spiral, 2 of gradient
+    ]
     assert "Median and 10–90 % band of 3 recorded runs at disturbances.0.mass_kg = 0.0" in text
     assert "1 recordings could not be read." in text
     assert "None of 4 recordings could be read." in text
@@ -237,7 +240,7 @@ def test_what_is_no_results_folder_is_refused(made_results, tmp_path):
         write_report(tmp_path)
     wrong = table.set_column(table.schema.get_field_index("scenario"), "scenario", table.column("seed"))
     pq.write_table(wrong, tmp_path / "runs.parquet")
-    with pytest.raises(SurgsimError, match="'scenario' holds something other than text"):
+    with pytest.raises(SurgsimError, match="column 'scenario' holds int64, not string"):
         write_report(tmp_path)
     pq.write_table(table, tmp_path / "runs.parquet")
     (tmp_path / "suite.json").write_text("{")

@@ -277,7 +277,8 @@ def test_overrides_are_checked_the_same_way():
     document = parse_yaml(TEXT, "s.yaml")
     assert validate(World, set_value(document, "task.radius_m=0.03")).task.radius_m == 0.03
     assert failure(set_value(document, "task.radius=0.03")) == (
-        "--set task.radius=0.03: task.radius: unknown key (value 0.03). Allowed: type, radius_m, centre_m."
+        "--set task.radius=0.03: task.radius: unknown key (value 0.03). "
+        "Allowed: type, radius_m, centre_m. Did you mean 'radius_m'?"
     )
     assert failure(set_value(document, "disturbances.0.mass_kg=-1")) == (
         "--set disturbances.0.mass_kg=-1: disturbances.0.mass_kg: -1 is not allowed:"

@@ -124,7 +124,8 @@ class Failing:
     """The controller of a setup that fails at one tick."""
 
     def __init__(self, inner, tick, answer):
-        self.inner, self.terms, self.tick_number, self.answer = inner, inner.terms, tick, answer
+        self.inner, self.terms, self.columns = inner, inner.terms, inner.columns
+        self.tick_number, self.answer = tick, answer
 
     def reset(self):
         self.inner.reset()
@@ -150,10 +151,12 @@ def test_a_controller_s_failure_ends_the_run_as_its_outcome(scenario):
     ending = trace.meta.ending
     assert (ending.outcome, ending.detail) == (Outcome.INFEASIBLE, "no joint velocity meets the rows")
     assert ending.t_s == pytest.approx(0.007)
-    assert len(trace) == 8
+    run = trace.active()
+    assert len(run) == 8
     assert np.isfinite(trace.block("q")).all()
-    assert np.isnan(trace.block("qdot_ref")[-1]).all()
-    assert np.isfinite(trace.block("qdot_ref")[:-1]).all()
+    assert np.isnan(run.block("qdot_ref")[-1]).all()
+    assert np.isfinite(run.block("qdot_ref")[:-1]).all()
+    assert run["infeasible"].tolist() == [0.0] * 7 + [1.0]
 
 
 @pytest.mark.parametrize("tick", [0, 5])

@@ -7,19 +7,19 @@ import numpy as np
 import pytest
 
 from surgsim.errors import Outcome
-from surgsim.plant.state import State
-from surgsim.plant.truth import Truth
+from surgsim.plant.truth import Contact, Truth
 from surgsim.scenario.schema import SafetyConfig
 from surgsim.simulate.loop import simulate
 from surgsim.simulate.safety import SafetyMonitor
 from surgsim.simulate.setup import prepare
 from surgsim.tasks.base import TipCommand
 
-SAFE = SafetyConfig(rcm_error_max_m=0.01, tip_error_max_m=0.02)
+SAFE = SafetyConfig(rcm_error_max_m=0.01, tip_error_max_m=0.02, trocar_force_max_n=5.0, tip_force_max_n=2.0)
 TIP = np.array([0.0, 0.0, -0.2])
-TRUTH = Truth(p_WT=TIP, p_WR=np.array([0.0, 0.0, 0.2]), p_WC=np.array([0.006, 0.008, 0.0]))
+TRUTH = Truth(
+    q=np.zeros(7), v=np.zeros(7), p_WT=TIP, p_WR=np.array([0.0, 0.0, 0.2]), p_WC=np.array([0.006, 0.008, 0.0])
+)
 COMMAND = TipCommand(p_WTd=np.array([0.0, 0.02, -0.2]), v_WTd=np.zeros(3), a_WTd=np.zeros(3))
-STILL = State(t_s=1.5, q=np.zeros(7), v=np.zeros(7), tau=np.zeros(7), p_WC=TRUTH.p_WC, v_WC=np.zeros(3))
 
 
 def _joints(**given):
@@ -29,9 +29,9 @@ def _joints(**given):
     return values
 
 
-def _check(arm, config=SAFE, *, truth=TRUTH, command=COMMAND, has_trocar=True, **state):
-    monitor = SafetyMonitor(config, arm.limits, has_trocar)
-    return monitor.check(replace(STILL, **state), truth, command)
+def _check(arm, config=SAFE, *, truth=TRUTH, command=COMMAND, has_trocar=True, tear=np.inf, **state):
+    monitor = SafetyMonitor(config, arm.limits, has_trocar, tear)
+    return monitor.check(1.5, replace(truth, **state), command)
 
 
 def test_at_the_limits_nothing_happens(arm):
@@ -63,6 +63,22 @@ CASES = [
         Outcome.TIP_LIMIT,
         "tip 20.50 mm from its command, limit 20.00 mm",
     ),
+    (
+        {"contact": Contact(detail="link5 touches the patient, 3.1 mm deep", with_patient=True)},
+        Outcome.PATIENT_COLLISION,
+        "link5 touches the patient, 3.1 mm deep",
+    ),
+    (
+        {"contact": Contact(detail="link1 touches shaft, 0.2 mm deep", with_patient=False)},
+        Outcome.SELF_COLLISION,
+        "link1 touches shaft, 0.2 mm deep",
+    ),
+    (
+        {"f_C": np.array([3.0, 4.0, 0.001])},
+        Outcome.FORCE_LIMIT,
+        "trocar force 5.00 N, limit 5.00 N",
+    ),
+    ({"f_T": np.array([0.0, 0.0, -2.5])}, Outcome.FORCE_LIMIT, "tip force 2.50 N, limit 2.00 N"),
 ]
 
 
@@ -72,8 +88,25 @@ def test_a_limit_passed_is_named_with_joint_value_and_limit(arm, changes, outcom
     assert (ending.outcome, ending.detail, ending.t_s) == (outcome, detail, 1.5)
 
 
+def test_a_force_past_what_the_incision_bears_is_torn_before_it_is_a_limit(arm):
+    ending = _check(arm, tear=5.0, f_C=np.array([0.0, 0.0, -5.5]))
+    assert ending.outcome is Outcome.INCISION_TORN
+    assert ending.detail == "shaft presses on the wall with 5.50 N, it tears at 5.00 N"
+
+
+def test_forces_at_their_limits_and_forces_that_are_not_there_are_safe(arm):
+    within = SAFE.model_copy(update={"rcm_error_max_m": None})
+    force = {"f_C": np.array([3.0, 4.0, 0.0]), "f_T": np.array([2.0, 0.0, 0.0])}
+    assert _check(arm, within, tear=5.0, **force) is None
+    assert _check(arm, within, tear=5.0) is None
+
+
 OFF = SafetyConfig(
-    rcm_error_max_m=None, tip_error_max_m=None, stop_at_joint_limit=False, stop_at_velocity_limit=False
+    rcm_error_max_m=None,
+    tip_error_max_m=None,
+    stop_at_collision=False,
+    stop_at_joint_limit=False,
+    stop_at_velocity_limit=False,
 )
 
 
@@ -93,7 +126,7 @@ HEAVY_AND_LIMP = [
     "controller.torque_law.rcm_stiffness_n_per_m=0",
     "controller.torque_law.rcm_damping_n_s_per_m=0",
     "disturbances=[{type: payload, mass_kg: 10.0}]",
-    "safety={rcm_error_max_m: null, stop_at_velocity_limit: false}",
+    "safety={rcm_error_max_m: null, stop_at_velocity_limit: false, stop_at_collision: false}",
     "task.duration_s=4",
     "task.hold_start_s=1",
 ]
@@ -119,6 +152,7 @@ def test_a_scenario_ends_in_each_outcome_within_a_tick(scenario, changes, outcom
     ending = trace.meta.ending
     assert ending.outcome is outcome
     assert re.fullmatch(detail, ending.detail)
+    trace = trace.active()
     assert ending.t_s == trace["t_s"][-1] > 0.0
     assert np.isnan(trace.block("qdot_ref")[-1]).all()
 

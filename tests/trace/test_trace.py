@@ -6,8 +6,9 @@ import re
 import numpy as np
 import pytest
 
+from surgsim.columns import joints, scalar, vector
 from surgsim.errors import Outcome
-from surgsim.trace.trace import BASE_BLOCKS, Ending, Trace, TraceMeta, joints, scalar, vector
+from surgsim.trace.trace import BASE_BLOCKS, Ending, Trace, TraceMeta
 
 AXES = ("x", "y", "z")
 CONTRACT = (

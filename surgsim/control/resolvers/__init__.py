@@ -8,6 +8,7 @@ RESOLVERS = Catalog(
     {
         "gradient": "surgsim.control.resolvers.gradient:GradientConfig",
         "mink": "surgsim.control.resolvers.mink:MinkConfig",
+        "passive_qp": "surgsim.control.resolvers.passive_qp:PassiveQpConfig",
         "pinv": "surgsim.control.resolvers.pinv:PinvConfig",
         "policy": "surgsim.control.resolvers.policy:PolicyConfig",
         "qp": "surgsim.control.resolvers.qp:QpConfig",

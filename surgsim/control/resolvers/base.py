@@ -8,7 +8,10 @@ Memory = TypeVar("Memory")
 
 
 class Resolver(Protocol[Memory]):
-    """Resolves redundancy at velocity level. Its state is explicit, so a step is a pure function."""
+    """Resolves redundancy at velocity level. Its state is explicit, so a step is a pure function.
+
+    A resolver may have `columns`, blocks that its `Resolution.values` add to the trace.
+    """
 
     def start(self, problem: VelocityProblem) -> Memory:
         """State before the first step."""

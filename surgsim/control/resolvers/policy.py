@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from pydantic import Field, PositiveFloat, PositiveInt
 
 from surgsim.catalog import PartConfig
+from surgsim.columns import Block
 from surgsim.control.policies.asking import Asker, Held
 from surgsim.control.policies.registry import find_policy
 from surgsim.control.problem import Resolution, VelocityProblem, bounded_resolution, stacked_rows
@@ -17,7 +18,7 @@ from surgsim.models.arm import ArmModel
 from surgsim.tasks.base import TipCommand
 
 Array = NDArray[np.float64]
-_OTHERS = tuple(RESOLVERS.config(name) for name in RESOLVERS.names() if name != "policy")
+_OTHERS = tuple(RESOLVERS.usable(name) for name in RESOLVERS.names() if name != "policy")
 AnyOtherResolver: Any = Annotated[Union[_OTHERS], Field(discriminator="type", title="resolver")]  # noqa: UP007
 
 
@@ -81,6 +82,7 @@ class PolicyResolver:
     def __init__(self, asker: Asker, inner: Any) -> None:
         self._asker = asker
         self._inner = inner
+        self.columns: tuple[Block, ...] = tuple(getattr(inner, "columns", ()))
 
     def start(self, problem: VelocityProblem) -> PolicyMemory:
         """The reference is where the tip is; the policy has not been asked."""

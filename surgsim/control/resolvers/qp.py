@@ -4,10 +4,11 @@ from typing import Annotated, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import AfterValidator, FiniteFloat, NonNegativeFloat, PositiveFloat
+from pydantic import AfterValidator, NonNegativeFloat, PositiveFloat
 
 from surgsim.catalog import PartConfig
 from surgsim.control.manipulability import log_manipulability_gradient
+from surgsim.control.planes import PlaneConfig, Planes
 from surgsim.control.problem import (
     ControlFailure,
     Resolution,
@@ -19,12 +20,16 @@ from surgsim.control.problem import (
 from surgsim.control.qp import DenseQp
 from surgsim.errors import Outcome, unknown_name
 from surgsim.models.arm import ArmModel
-from surgsim.models.config import Vec3
 
 Array = NDArray[np.float64]
 
 
-def _check_backend(name: str) -> str:
+def check_backend(name: str) -> str:
+    """`name`, if there is such a solver here.
+
+    Raises:
+        ValueError: If there is not.
+    """
     if name == "daqp":
         return name
     import qpsolvers  # half a second, and only the other back ends need it
@@ -32,18 +37,6 @@ def _check_backend(name: str) -> str:
     if name not in qpsolvers.available_solvers:
         raise ValueError(unknown_name(name, "QP solver installed here", qpsolvers.available_solvers))
     return name
-
-
-class PlaneConfig(PartConfig):
-    """Virtual wall that the tip must not pass.
-
-    Attributes:
-        normal: Direction out of the allowed side.
-        offset_m: The allowed side is normal . p <= offset_m, with the normal scaled to length one [m].
-    """
-
-    normal: Vec3
-    offset_m: FiniteFloat
 
 
 class QpConfig(PartConfig):
@@ -72,7 +65,7 @@ class QpConfig(PartConfig):
     acceleration_limit: bool = True
     planes: tuple[PlaneConfig, ...] = ()
     plane_gain_per_s: PositiveFloat = 20.0
-    solver: Annotated[str, AfterValidator(_check_backend)] = "daqp"
+    solver: Annotated[str, AfterValidator(check_backend)] = "daqp"
 
     def build(self, arm: ArmModel) -> "Qp":
         """The resolver."""
@@ -90,14 +83,12 @@ class Qp:
     Where the bounds of acceleration and Omega exclude each other, Omega holds. An infeasible program is the
     outcome INFEASIBLE with its matrices attached, never a silent zero.
 
-    Source: passive convex teleoperation paper, sections 1.1-1.3; its passivity row belongs to teleoperation.
+    Source: passive convex teleoperation paper, sections 1.1-1.3; `passive_qp` is the whole of it.
     """
 
     def __init__(self, config: QpConfig) -> None:
         self._c = config
-        self._normals = np.array([plane.normal for plane in config.planes], dtype=float).reshape(-1, 3)
-        self._normals /= np.linalg.norm(self._normals, axis=1, keepdims=True)
-        self._offsets = np.array([plane.offset_m for plane in config.planes])
+        self._planes = Planes(config.planes, config.plane_gain_per_s)
         soft = 3 if config.tip == "soft" else 0
         self._H = np.diag([config.velocity_weight] * 7 + [2.0 * config.slack_weight] * soft)
         self._free = np.full(soft, np.inf)
@@ -117,7 +108,7 @@ class Qp:
         if x is None:
             raise ControlFailure(
                 Outcome.INFEASIBLE,
-                f"QP: no joint velocity meets {len(v)} task rows, {len(self._offsets)} planes and the bounds",
+                f"QP: no joint velocity meets {len(v)} task rows, {len(self._planes)} planes and the bounds",
                 program,
             )
         resolution = bounded_resolution(problem, x[:7], J, v)
@@ -137,11 +128,11 @@ class Qp:
         if self._c.manipulability_weight:
             gradient = log_manipulability_gradient(problem.kin.Jv_WT, problem.kin.z_W)
             f[:7] = -self._c.manipulability_weight * gradient
-        room = self._c.plane_gain_per_s * (self._offsets - self._normals @ problem.kin.p_WT)
+        walls, room = self._planes.rows(problem.kin)
         G = np.zeros((len(v) + len(room), 7 + soft))
         G[: len(v), :7] = J
         G[:soft, 7:] = -np.eye(soft)
-        G[len(v) :, :7] = self._normals @ problem.kin.Jv_WT
+        G[len(v) :, :7] = walls
         return {
             "H": self._H,
             "f": f,

@@ -1,6 +1,6 @@
 """Interface of a torque-level law."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Protocol, TypeVar
 
 import numpy as np
@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from surgsim.control.problem import Resolution
 from surgsim.control.rcm import Rcm
 from surgsim.models.arm import Dynamics, Kinematics
+from surgsim.plant.state import NO_FORCE
 from surgsim.tasks.base import TipCommand
 
 Array = NDArray[np.float64]
@@ -30,9 +31,11 @@ class TorqueProblem:
         rcm: RCM error and Jacobian at `q`, or None without a trocar.
         p_WC: Trocar position (3,) [m].
         v_WC: Trocar velocity (3,) [m/s].
+        a_WC: Trocar acceleration (3,) [m/s^2].
         command: Desired tip motion.
         resolution: The resolver's answer.
         q_ref: Joint reference, integrated from the resolver's velocities (7,) [rad].
+        f_T: Measured force of the surroundings on the tip (3,) [N].
     """
 
     t_s: float
@@ -48,6 +51,8 @@ class TorqueProblem:
     command: TipCommand
     resolution: Resolution
     q_ref: Array
+    a_WC: Array = field(default_factory=lambda: NO_FORCE)
+    f_T: Array = field(default_factory=lambda: NO_FORCE)
 
 
 class TorqueLaw(Protocol[Memory]):

@@ -17,6 +17,8 @@ from surgsim.control.torque_laws.base import TorqueProblem
 from surgsim.models.arm import ArmModel, Dynamics, Kinematics
 
 Array = NDArray[np.float64]
+_ORDERS = np.array([2.0, 1.0, 2.0, 1.0, 2.0, 1.0])
+"""How stiffness and damping gains go with the bandwidth."""
 
 
 class RcmInverseDynamicsConfig(PartConfig):
@@ -33,6 +35,11 @@ class RcmInverseDynamicsConfig(PartConfig):
             in; 0 switches it off.
         most_delay_ticks: Longest actuation delay that is recognised and predicted over; 0 switches the
             prediction off.
+        full_gain_delay_s: Longest recognised delay at which all gains are whole; past it the bandwidths fall as
+            its inverse [s].
+        contact: What becomes of the measured force on the tip: `reject` lets the observer cancel it like
+            any disturbance; `yield` cancels it too, but for the tip's acceleration along it, so that the tip is an
+            impedance towards what it touches.
     """
 
     type: Literal["rcm_inverse_dynamics"] = "rcm_inverse_dynamics"
@@ -44,6 +51,8 @@ class RcmInverseDynamicsConfig(PartConfig):
     joint_damping_ratio: NonNegativeFloat = 1.0
     observer_gain: Annotated[float, Field(ge=0.0, le=1.0)] = 0.3
     most_delay_ticks: NonNegativeInt = 20
+    full_gain_delay_s: PositiveFloat = 0.01
+    contact: Literal["reject", "yield"] = "reject"
 
     def build(self, arm: ArmModel) -> "RcmInverseDynamics":
         """The law."""
@@ -63,7 +72,7 @@ class RcmInverseDynamics:
 
     The accelerations ask for second-order error dynamics,
 
-        J_rcm q'' = -b_rcm - k_r e - 2 z_r sqrt(k_r) e'
+        J_rcm q'' = N C'' - b_rcm - k_r e - 2 z_r sqrt(k_r) e'
         J_T q''   = a_d - J_T' q' + 2 z_t sqrt(k_t) (v_d - v) + k_t (p_d - p)
         q''       = k_q (q_ref - q) + 2 z_q sqrt(k_q) (q_ref' - q')        in the null space of both
 
@@ -73,9 +82,20 @@ class RcmInverseDynamics:
     tip, and the RCM last (`PriorityProgram`).
 
     d is the disturbance torque that `DisturbanceObserver` infers from measured torque and motion: payload,
-    friction, wrong inertia, pushes. It is fed by the measured torque, so that saturation does not wind it up.
+    friction, wrong inertia, pushes. It is fed by the measured torque, so that saturation and late torques do
+    not wind it up, less the slow mean by which measured and commanded torque differ: a biased drive or
+    sensor. With `contact: yield` the measured force f on the tip is not left to the observer. It is cancelled
+    at once, and the tip is asked for the acceleration along f that it would take under it with the shaft held
+    in the trocar,
+
+        a_T += f (f' P f) / (f' f),    P the tip's mobility with the RCM held (3, 3) [1/kg],
+
+    so that RCM, posture and the tip across f do not give way.
+
     An actuation delay shows as the lag of measured behind commanded torque (`DelayEstimate`); the law then
-    acts on the state predicted with the torques still on their way, which is why stiff gains survive it.
+    acts on the state predicted with the torques still on their way, which is why stiff gains survive it. Past
+    `full_gain_delay_s` the prediction is no longer good enough: bandwidths and observer gain fall as its
+    inverse.
 
     Source: ours; the hierarchy is operational-space control (Khatib 1987), the observer the discrete form of
     a momentum observer (De Luca et al. 2006), the prediction one of the state over the dead time.
@@ -114,35 +134,49 @@ class RcmInverseDynamics:
     ) -> tuple[Array, InverseDynamicsMemory]:
         """Rows tip, rcm, joint, bias, observer, limits (6, 7) [N m]."""
         p = problem
-        observer = self._observer.update(memory.observer, p)
-        delay = memory.delay.update(p.tau_measured)
+        delay = memory.delay.update(p.tau_measured, p.dt_s)
         late_s = delay.ticks * p.dt_s
+        share = min(1.0, self._c.full_gain_delay_s / late_s) if delay.ticks else 1.0
+        touch = p.f_T @ p.kin.Jv_WT if self._c.contact == "yield" else np.zeros(7)
+        observer = self._observer.update(memory.observer, p, share, delay.offset - touch)
+        d = observer.disturbance + touch
         q, v, kin, dyn = p.q, p.v, p.kin, p.dyn
         if delay.ticks:
-            q, v = predict(p, delay.in_flight, observer.disturbance, self._damping)
+            q, v = predict(p, delay.in_flight, d, self._damping)
             kin, dyn = self._arm.evaluate(q, v)
-        terms = self._terms(p, q, v, kin, dyn, late_s, observer.disturbance)
+        terms = self._terms(p, q, v, kin, dyn, late_s, d, share)
         limit = self._arm.limits.torque
         sent = np.minimum(np.maximum(terms.sum(axis=0), -limit), limit)
         return terms, InverseDynamicsMemory(observer=observer, delay=delay.sent(sent))
 
     def _terms(
-        self, p: TorqueProblem, q: Array, v: Array, kin: Kinematics, dyn: Dynamics, late_s: float, d: Array
+        self,
+        p: TorqueProblem,
+        q: Array,
+        v: Array,
+        kin: Kinematics,
+        dyn: Dynamics,
+        late_s: float,
+        d: Array,
+        share: float,
     ) -> Array:
         """Terms of the torque for the state (q, v) that is reached `late_s` from now."""
-        k, command = self._gains, p.command
+        k, command = self._gains * share**_ORDERS, p.command
         linear, angular = velocity_product_accelerations(kin, v)
         p_d = command.p_WTd + late_s * (command.v_WTd + 0.5 * late_s * command.a_WTd)
         v_d = command.v_WTd + late_s * command.a_WTd
         a_tip = command.a_WTd - linear + k[3] * (v_d - kin.Jv_WT @ v) + k[2] * (p_d - kin.p_WT)
         J, a = kin.Jv_WT, a_tip
         if p.rcm is not None:
-            p_WC = p.p_WC + late_s * p.v_WC
-            rcm = rcm_kinematics(kin, p_WC, p.v_WC)
-            bias = rcm_bias_acceleration(kin, v, p_WC, p.v_WC, linear, angular)
+            p_WC = p.p_WC + late_s * (p.v_WC + 0.5 * late_s * p.a_WC)
+            v_WC = p.v_WC + late_s * p.a_WC
+            rcm = rcm_kinematics(kin, p_WC, v_WC)
+            bias = rcm_bias_acceleration(kin, v, p_WC, v_WC, linear, angular) - rcm.normals @ p.a_WC
             e_dot = rcm.jacobian @ v - rcm.trocar_velocity
             J = np.concatenate((J, rcm.jacobian))
             a = np.concatenate((a, -bias - k[0] * rcm.error - k[1] * e_dot))
+        if self._c.contact == "yield" and p.f_T.any():
+            a[:3] += _giving_way(dyn.mass_matrix, J, p.f_T)
         qdot_ref = p.resolution.qdot
         posture = k[4] * (p.q_ref + late_s * qdot_ref - q) + k[5] * (qdot_ref - v)
         constant = dyn.bias + self._damping * v - d
@@ -177,6 +211,13 @@ def _predict(
         v = v + dt * np.linalg.solve(implicit, in_flight[i] - bias - damping * v)
         q = q + dt * v
     return q, v
+
+
+@compiled
+def _giving_way(M: Array, J: Array, f: Array) -> Array:
+    """Acceleration of the tip (3,) along the force `f` on it, the further rows of `J` held."""
+    held = np.ascontiguousarray(np.linalg.inv(J @ np.linalg.solve(M, J.T))[:3, :3])
+    return f * (f @ np.linalg.solve(held, f)) / (f @ f)
 
 
 @compiled

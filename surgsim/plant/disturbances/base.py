@@ -1,14 +1,14 @@
-"""Interface of a disturbance: any of three hooks, each doing nothing by default."""
+"""What every disturbance has: its config's base and the spread over seeds."""
 
-from typing import Annotated
+from typing import Annotated, Literal
 
-import mujoco
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
 from surgsim.catalog import PartConfig
-from surgsim.models.build import Scene
+from surgsim.plant.part import PlantPart
+from surgsim.spatial import unit
 
 Array = NDArray[np.float64]
 
@@ -16,10 +16,45 @@ Array = NDArray[np.float64]
 Spread = Annotated[float, Field(ge=0.0, le=1.0)]
 """Half-width of a uniform relative spread: a value x is drawn from x (1 - spread) to x (1 + spread)."""
 
+Direction = Literal["given", "random"]
+"""Whether a vector points where it is said to, or keeps its size and points in a drawn direction."""
+
+SENSOR, LATE = 1, 2
+"""Ranks in the chain of `sense`: what is known of the port, then noise, then the way to the controller."""
+DELAYED, QUANTISED, BIASED = 1, 2, 3
+"""Ranks in the chain of `actuate`: missed ticks, then the delay to the drive, its resolution, its bias."""
+
 
 def spread_factor(rng: np.random.Generator, spread: float, size: int = 1) -> Array:
     """`size` factors drawn uniformly from 1 - spread to 1 + spread."""
     return 1.0 + spread * rng.uniform(-1.0, 1.0, size)
+
+
+def pointed(rng: np.random.Generator, vector: Array, direction: Direction) -> Array:
+    """`vector` (3,) as given, or turned to a direction drawn from the sphere."""
+    if direction == "given":
+        return vector
+    return float(np.linalg.norm(vector)) * unit(rng.normal(size=3))
+
+
+def whole_ticks(name: str, key: str, time_s: float, control_period_s: float) -> int:
+    """A time in control periods.
+
+    Args:
+        name: The disturbance, for the message.
+        key: Of the time.
+        time_s: The time [s].
+        control_period_s: The control period [s].
+
+    Raises:
+        ValueError: If it is no whole multiple.
+    """
+    ratio = time_s / control_period_s
+    if abs(ratio - round(ratio)) > 1e-6 or (time_s > 0.0 and round(ratio) < 1):
+        raise ValueError(
+            f"{name}: {key} {time_s:g} must be a whole multiple of control_period_s {control_period_s:g}"
+        )
+    return round(ratio)
 
 
 class DisturbanceConfig(PartConfig):
@@ -33,26 +68,5 @@ class DisturbanceConfig(PartConfig):
         """
 
 
-class Disturbance:
-    """A disturbance of the plant. Subclasses override the hooks that they need.
-
-    A config builds it with the run's own random generator, from which its values are drawn if they have a
-    spread: the same seed gives the same values.
-
-    `modify` changes the model before it is compiled. `start` is called at every reset with the
-    disturbance's own random generator. `act` may change the torque on its way to the joints, and write
-    external forces into `xfrc_applied`.
-    """
-
-    def modify(self, spec: mujoco.MjSpec) -> None:
-        """Change the model before it is compiled."""
-
-    def start(self, scene: Scene, rng: np.random.Generator, dt_s: float) -> None:
-        """Forget the last run."""
-
-    def delay(self, torque: Array) -> Array:
-        """Torque (7,) [N m] that reaches the joints in this period, given the one commanded."""
-        return torque
-
-    def push(self, t_s: float, scene: Scene, data: mujoco.MjData) -> None:
-        """Add external forces and torques at `t_s` [s] to `data.xfrc_applied`, zeroed before."""
+class Disturbance(PlantPart):
+    """A part of the plant that the controller's model does not know of."""

@@ -41,10 +41,11 @@ class Payload(Disturbance):
         m = self._mass
         if m <= 0.0:
             return
+        name = _free_name(spec)
         radius = (3.0 * m / (4.0 * np.pi * 1000.0)) ** (1.0 / 3.0)
         inertia = 0.4 * m * radius**2
         body = flange.parent.add_body(
-            name="payload",
+            name=name,
             pos=np.array(flange.pos) + np.array([0.0, 0.0, self._c.distance_m]),
             quat=flange.quat,
             mass=m,
@@ -53,7 +54,7 @@ class Payload(Disturbance):
             explicitinertial=True,
         )
         body.add_geom(
-            name="payload",
+            name=name,
             type=mujoco.mjtGeom.mjGEOM_SPHERE,
             size=[radius, 0, 0],
             mass=0.0,
@@ -62,3 +63,9 @@ class Payload(Disturbance):
             group=2,
             rgba=[0.35, 0.2, 0.55, 1.0],
         )
+
+
+def _free_name(spec: mujoco.MjSpec) -> str:
+    """`payload`, or with a number where there are several."""
+    taken = sum(body.name.startswith("payload") for body in spec.bodies)
+    return f"payload{taken + 1}" if taken else "payload"

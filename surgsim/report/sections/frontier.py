@@ -8,16 +8,18 @@ import numpy as np
 
 from surgsim.compare.observations import Observations
 from surgsim.report import html
+from surgsim.report.axes import axes_of, sweeps_of
 from surgsim.report.figures.frontier import Track, frontier_plot
 from surgsim.report.results import Results, parameters_of
 from surgsim.report.sections.leaderboard import metric_label
 
 
 def frontiers(runs: Observations, results: Results, controllers: Sequence[str]) -> str:
-    """Figures for every numeric parameter with at least two values; empty without one."""
+    """Figures for every numeric parameter of the grid with at least two values; empty without one."""
     points = [parameters_of(text) for text in runs.parameters.tolist()]
     drawn = []
-    for key in dict.fromkeys(key for point in points for key in point):
+    elsewhere = {axis.name for axis in (*axes_of(results), *sweeps_of(results))}
+    for key in dict.fromkeys(key for point in points for key in point if key not in elsewhere):
         mask, fixed = _along(points, key)
         if mask.any():
             drawn.append(_frontiers(runs.where(mask), results, controllers, key, fixed))

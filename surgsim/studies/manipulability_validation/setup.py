@@ -8,7 +8,7 @@ import numpy as np
 
 from surgsim.scenario.schema import Scenario
 from surgsim.simulate.setup import Setup, prepare
-from surgsim.tasks.base import Task, TipCommand
+from surgsim.tasks.base import Feedback, Task, TimedTask, TipCommand
 
 Method = Literal["pinv", "rnn", "self_motion"]
 Timing = Literal["paper", "smooth"]
@@ -150,7 +150,7 @@ def prepared(cell: Cell, **network: float | str) -> Setup:
     return replace(setup, task=SteppedTask(setup.task))
 
 
-class SteppedTask:
+class SteppedTask(TimedTask):
     """A task whose velocity is the step to the next sample over the period, eq. (2).
 
     The mean velocity of a step, where the task itself gives the velocity at its beginning. With the latter
@@ -165,7 +165,7 @@ class SteppedTask:
         """Length of the whole task [s]."""
         return self._task.duration_s
 
-    def command(self, t_s: float) -> TipCommand:
+    def command(self, t_s: float, feedback: Feedback | None = None) -> TipCommand:
         """Desired position at `t_s` [s] and (r(k+1) - r(k)) / T."""
         here = self._task.command(t_s).p_WTd
         there = self._task.command(t_s + PERIOD_S).p_WTd

@@ -9,8 +9,9 @@ import pytest
 from pydantic import ValidationError
 from scipy.optimize import lsq_linear
 
+from surgsim.control.planes import PlaneConfig
 from surgsim.control.problem import ControlFailure
-from surgsim.control.resolvers.qp import PlaneConfig, Qp, QpConfig
+from surgsim.control.resolvers.qp import Qp, QpConfig
 from surgsim.control.resolvers.vprnn import Vprnn, VprnnConfig
 from surgsim.errors import Outcome
 from surgsim.runs.folder import run_to_folder

@@ -54,3 +54,36 @@ def test_a_motion_is_late_by_the_delay_and_otherwise_the_same(disturbed):
     delayed = motion(late, [*hold, *commands])
     shifted = motion(prompt, [*np.tile(hold, (5, 1)), *commands])[: len(delayed)]
     np.testing.assert_array_equal(delayed, shifted)
+
+
+def _arrivals(disturbed, seed, ticks=2, jitter=3, n=4000):
+    """Number of the command that acts at each tick."""
+    config = ActuationDelayConfig(delay_s=ticks * disturbed.DT, jitter_s=jitter * disturbed.DT)
+    delay = disturbed.started(config, seed)
+    return np.array([int(delay.actuate(np.full(7, float(k)))[0]) for k in range(n)])
+
+
+def test_with_jitter_every_command_is_late_by_its_own_time_and_none_overtakes(disturbed):
+    acting = _arrivals(disturbed, 0)
+    age = np.arange(len(acting)) - acting
+    assert (np.diff(acting) >= 0).all()
+    assert set(age[10:]) == {2, 3, 4, 5}
+    np.testing.assert_array_equal(acting[:2], 0)
+    missed = 1.0 - len(np.unique(acting)) / len(acting)  # arrived together with a newer one
+    assert 0.3 < missed < 0.7
+
+
+def test_jitter_is_as_likely_to_be_each_number_of_ticks(disturbed):
+    """The acting command is as old as the delay when it had no jitter, and those before it not too much."""
+    age = np.arange(20000) - _arrivals(disturbed, 1, n=20000)
+    assert (age[10:] == 2).mean() == pytest.approx(1 / 4 * 2 / 4 * 3 / 4, rel=0.1)
+
+
+def test_jitter_repeats_from_the_seed(disturbed):
+    np.testing.assert_array_equal(_arrivals(disturbed, 3), _arrivals(disturbed, 3))
+    assert (_arrivals(disturbed, 3) != _arrivals(disturbed, 4)).any()
+
+
+def test_a_jitter_that_is_no_multiple_of_the_period_is_refused(scenario):
+    with pytest.raises(ScenarioError, match=r"jitter_s 0\.0005 must be a whole multiple"):
+        scenario("disturbances=[{type: actuation_delay, jitter_s: 0.0005}]")

@@ -4,7 +4,8 @@ import mujoco
 import numpy as np
 import pytest
 
-from surgsim.plant.disturbances.joint_friction import JointFrictionConfig
+from surgsim.errors import ScenarioError
+from surgsim.plant.disturbances.joint_friction import JointFriction, JointFrictionConfig
 
 COULOMB = 0.5
 CREEP_RAD_PER_S = 0.005  # MuJoCo's friction is a soft constraint
@@ -76,3 +77,96 @@ def test_each_joint_s_friction_is_drawn_within_the_spread_from_the_seed(arm, dis
     np.testing.assert_array_equal(friction(3)[0], drawn[3])
     dry, viscous = friction(3)
     np.testing.assert_allclose(viscous, 2.0 * dry)
+
+
+STATIC, STRIBECK = 0.8, 0.05
+
+
+def _stribeck(**keys):
+    return JointFrictionConfig(
+        coulomb_nm=COULOMB, static_nm=STATIC, stribeck_velocity_rad_per_s=STRIBECK, **keys
+    )
+
+
+def test_without_a_static_torque_it_is_coulomb_friction_and_nothing_runs_in_a_step():
+    assert type(JointFrictionConfig().build(np.random.default_rng(0))) is JointFriction
+    assert JointFriction.push is JointFriction.__mro__[2].push
+
+
+@joints
+def test_it_breaks_away_at_the_static_torque_not_at_coulomb_s(arm, disturbed, q, joint):
+    def end(share, config):
+        return _motion(arm, disturbed, q, joint, share * STATIC, 200, config)[-1].v[joint]
+
+    between = (COULOMB + STATIC) / (2 * STATIC)
+    assert end(between, _stribeck()) < CREEP_RAD_PER_S
+    assert end(between, JointFrictionConfig(coulomb_nm=COULOMB)) > CREEP_RAD_PER_S
+    assert end(1.5, _stribeck()) > 5.0 * CREEP_RAD_PER_S
+
+
+def _sliding(disturbed, q, config, speed):
+    """Joint velocities one step after `speed`."""
+    plant = disturbed.plant_of(config)
+    plant.reset(q)
+    plant._qvel[:] = speed
+    mujoco.mj_step1(plant._scene.model, plant._data)
+    plant.step(np.zeros(7), np.zeros(7))
+    return plant._data.qvel.copy()
+
+
+@pytest.mark.parametrize("speed", [0.03, 0.05, 0.1, 0.3])
+def test_in_motion_it_falls_from_static_to_coulomb_friction_with_speed(arm, disturbed, q, speed):
+    """Momentum lost to friction in one step, beside that of Coulomb friction alone."""
+    M = arm.dynamics(q, np.zeros(7)).mass_matrix + disturbed.DT * np.diag(arm.damping)
+    speed = speed * np.array([1, -1, 1, 1, -1, 1, -1])
+    dry, wet = (
+        _sliding(disturbed, q, config, speed)
+        for config in (JointFrictionConfig(coulomb_nm=COULOMB), _stribeck())
+    )
+    surplus = (STATIC - COULOMB) * np.exp(-((speed / STRIBECK) ** 2))
+    np.testing.assert_allclose(M @ (dry - wet) / disturbed.DT, np.sign(speed) * surplus, atol=0.02 * STATIC)
+
+
+def test_friction_takes_energy_out(arm, disturbed, q):
+    """Its force times the velocity after the step, over a motion that sticks, slips and turns.
+
+    A sticking joint creeps, on a soft constraint: what that puts in is below a millionth of what sliding
+    takes out.
+    """
+    plant = disturbed.plant_of(_stribeck())
+    state = plant.reset(q)
+    data, power, slips, sticks = plant._data, [], 0, 0
+    for k in range(1500):
+        drive = 1.2 * np.sin(2.0 * np.pi * 2.0 * k * disturbed.DT + np.arange(7))
+        mujoco.mj_step1(plant._scene.model, data)
+        plant._parts.push(k * disturbed.DT, plant._scene, data)
+        data.ctrl[:] = arm.dynamics(state.q, state.v).bias + drive
+        bound = data.efc_frictionloss.copy()
+        assert len(bound) == 7
+        mujoco.mj_step2(plant._scene.model, data)
+        force, v = data.efc_force.copy(), data.qvel.copy()
+        assert (np.abs(force) <= bound + 1e-9).all()
+        power.append(force * v)
+        slips += (np.abs(v) > 0.01).sum()
+        sticks += (np.abs(v) < 1e-4).sum()
+        state = plant._state()
+    power = np.array(power)
+    assert slips > 1000
+    assert sticks > 1000
+    assert power[power > 0.0].sum() < 1e-6 * -power.sum()
+
+
+def test_several_add_up(disturbed, q):
+    once = disturbed.plant_of(JointFrictionConfig(coulomb_nm=1.0, static_nm=1.6))
+    twice = disturbed.plant_of(*[JointFrictionConfig(coulomb_nm=0.5, static_nm=0.8)] * 2)
+    once.reset(q), twice.reset(q)
+    for k in range(100):
+        a, b = (plant.step(np.full(7, 3.0 * np.sin(0.05 * k)), np.zeros(7)) for plant in (once, twice))
+    np.testing.assert_allclose(a.q, b.q, atol=1e-12)
+    assert np.abs(a.q - q).max() > 1e-3
+
+
+@pytest.mark.parametrize(("coulomb", "static"), [(0.5, 0.4), (0.0, 0.4)])
+def test_a_static_torque_below_coulomb_s_or_without_it_is_refused(scenario, coulomb, static):
+    with pytest.raises(ScenarioError, match=f"static_nm {static:g} must be at least coulomb_nm {coulomb:g}"):
+        scenario(f"disturbances=[{{type: joint_friction, coulomb_nm: {coulomb}, static_nm: {static}}}]")

@@ -7,7 +7,7 @@ import pytest
 from surgsim.plant.disturbances.push import PushConfig
 
 FORCE = np.array([3.0, -2.0, 4.0])
-POINTS = {"tip": 7, "elbow": 4, "wrist": 6}  # how many joints move it
+POINTS = {"tip": 7, "shaft": 7, "elbow": 4, "wrist": 6}  # how many joints move it
 seeds = pytest.mark.parametrize("seed", range(3))
 
 
@@ -26,9 +26,11 @@ def _joint_torque(scene, disturbance, q, t_s):
 @pytest.mark.parametrize("at", POINTS)
 def test_it_is_the_transposed_jacobian_times_the_force(arm, disturbed, random_q, seed, at):
     q = random_q(np.random.default_rng(seed))
-    scene, (push,) = disturbed.scene_of(PushConfig(force_n=tuple(FORCE), at=at, start_s=1.0, duration_s=1.0))
+    config = PushConfig(force_n=tuple(FORCE), at=at, distance_m=0.15, start_s=1.0, duration_s=1.0)
+    scene, (push,) = disturbed.scene_of(config)
     kin = arm.kinematics(q)
-    point = {"tip": kin.p_WT, "elbow": kin.anchors_W[3], "wrist": kin.anchors_W[5]}[at]
+    shaft = kin.p_WT - 0.15 * kin.R_WT[:, 2]
+    point = {"tip": kin.p_WT, "shaft": shaft, "elbow": kin.anchors_W[3], "wrist": kin.anchors_W[5]}[at]
     J = np.cross(kin.z_W, point - kin.anchors_W).T
     J[:, POINTS[at] :] = 0.0
     np.testing.assert_allclose(_joint_torque(scene, push, q, 1.5), J.T @ FORCE, atol=1e-9)

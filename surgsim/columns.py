@@ -1,0 +1,43 @@
+"""Named columns: what a part of the simulation adds to the record of a run."""
+
+from dataclasses import dataclass
+
+JOINTS = tuple(str(i + 1) for i in range(7))
+AXES = ("x", "y", "z")
+
+
+@dataclass(frozen=True)
+class Block:
+    """Columns that belong together, e.g. the seven joint positions.
+
+    Attributes:
+        name: Stem of the columns' names.
+        labels: What tells them apart: joints `1`..`7`, axes `x`, `y`, `z`, or one empty label.
+        unit: SI unit suffix, empty for a pure number.
+    """
+
+    name: str
+    labels: tuple[str, ...]
+    unit: str
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """Column names, e.g. `q1_rad`, `tip_x_m`, `manipulability`."""
+        joiner = "" if self.labels == JOINTS else "_"
+        stems = [f"{self.name}{joiner}{label}" if label else self.name for label in self.labels]
+        return tuple(f"{stem}_{self.unit}" if self.unit else stem for stem in stems)
+
+
+def joints(name: str, unit: str) -> Block:
+    """Block of seven joint columns."""
+    return Block(name, JOINTS, unit)
+
+
+def vector(name: str, unit: str) -> Block:
+    """Block of x, y and z."""
+    return Block(name, AXES, unit)
+
+
+def scalar(name: str, unit: str = "") -> Block:
+    """Block of one column."""
+    return Block(name, ("",), unit)

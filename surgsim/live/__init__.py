@@ -1,0 +1,1 @@
+"""A person operates the master console while the simulation runs in a window."""

@@ -1,0 +1,93 @@
+"""Peg and ring: how many rings came to their pegs, how fast, with how much force.
+
+Undefined (NaN) for a trace without a peg board.
+"""
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from surgsim.metrics.metric import Metric
+from surgsim.trace.trace import Trace
+
+GRASPED, ON_TARGET = 1.0, 2.0
+"""Values of the columns `ring_state_{1..n}`."""
+
+
+def _of_board(compute: Callable[[Trace], float]) -> Callable[[Trace], float]:
+    """`compute`, for traces with a peg board."""
+
+    def value(trace: Trace) -> float:
+        return compute(trace) if "ring_state" in trace and len(trace) else math.nan
+
+    return value
+
+
+def _at_end(trace: Trace) -> NDArray[np.bool_]:
+    """Which rings are on a target at the end."""
+    found: NDArray[np.bool_] = trace.block("ring_state")[-1] == ON_TARGET
+    return found
+
+
+def rings_transferred(trace: Trace) -> float:
+    """Rings that rest on a target peg at the end."""
+    return float(np.count_nonzero(_at_end(trace)))
+
+
+def rings_transferred_fraction(trace: Trace) -> float:
+    """The same over the number of rings."""
+    return float(np.mean(_at_end(trace)))
+
+
+def transfer_time_s(trace: Trace) -> float:
+    """Mean time from a ring's first grasp until it rests on its target for good [s]; NaN if none does."""
+    states, times = trace.block("ring_state"), []
+    for ring in np.flatnonzero(_at_end(trace)):
+        grasped = np.flatnonzero(states[:, ring] == GRASPED)
+        away = np.flatnonzero(states[:, ring] != ON_TARGET)
+        if grasped.size:
+            times.append(trace["t_s"][away[-1] + 1] - trace["t_s"][grasped[0]])
+    return float(np.mean(times)) if times else math.nan
+
+
+def ring_drops(trace: Trace) -> float:
+    """Rings that slipped out of the jaws, or were let go and came to rest on no peg."""
+    return float(trace["ring_drop_count"][-1])
+
+
+def peg_contact_force_max_n(trace: Trace) -> float:
+    """Largest force on the jaws: of the board, the pegs and the rings, the held one's weight included [N]."""
+    return float(np.max(trace["jaws_load_n"]))
+
+
+METRICS = (
+    Metric(
+        name="rings_transferred",
+        meaning="rings that rest on a target peg at the end",
+        compute=_of_board(rings_transferred),
+        lower_is_better=False,
+    ),
+    Metric(
+        name="rings_transferred_fraction",
+        meaning="the same over the number of rings",
+        compute=_of_board(rings_transferred_fraction),
+        lower_is_better=False,
+    ),
+    Metric(
+        name="transfer_time_s",
+        meaning="mean time from a ring's first grasp until it rests on its target peg",
+        compute=_of_board(transfer_time_s),
+    ),
+    Metric(
+        name="ring_drops",
+        meaning="rings that slipped out of the jaws, or were let go and came to rest on no peg",
+        compute=_of_board(ring_drops),
+    ),
+    Metric(
+        name="peg_contact_force_max_n",
+        meaning="largest force of board, pegs and rings on the jaws",
+        compute=_of_board(peg_contact_force_max_n),
+    ),
+)

@@ -1,0 +1,197 @@
+"""Teleoperation: how well the tip follows the master, and where the energy went.
+
+Undefined (NaN) for a trace of another task. Velocities of the tip are central differences of its true
+position.
+"""
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from surgsim.metrics.accuracy import rms
+from surgsim.metrics.force import largest
+from surgsim.metrics.metric import Metric
+from surgsim.trace.trace import Trace
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+FREE_SLACK_M_PER_S = 1e-4
+FREE_FORCE_N = 0.1
+_CONSTRAINTS = ("passivity_active", "planes_active", "qp_relaxed")
+_ALONE = ("ring_state", "trocar_force")
+
+
+def _teleoperated(compute: Callable[[Trace], float]) -> Callable[[Trace], float]:
+    """`compute`, for traces of a teleoperation."""
+
+    def value(trace: Trace) -> float:
+        return compute(trace) if "velocity_command" in trace and len(trace) > 1 else math.nan
+
+    return value
+
+
+def _of(block: str, compute: Callable[[Trace], float]) -> Callable[[Trace], float]:
+    """`compute`, for teleoperations whose trace has `block`."""
+    return _teleoperated(lambda trace: compute(trace) if block in trace else math.nan)
+
+
+def free_ticks(trace: Trace) -> Mask:
+    """Ticks in which nothing keeps the tip from its commanded velocity.
+
+    No constraint of the controller is active, its slack is below 0.1 mm/s, and nothing presses on the tip
+    with more than 0.1 N.
+    """
+    free = np.ones(len(trace), dtype=bool)
+    for name in _CONSTRAINTS:
+        if name in trace:
+            free &= trace[name] == 0.0
+    if "slack" in trace:
+        free &= np.linalg.norm(trace.block("slack"), axis=1) <= FREE_SLACK_M_PER_S
+    if "tip_force" in trace:
+        free &= np.linalg.norm(trace.block("tip_force"), axis=1) <= FREE_FORCE_N
+    return free
+
+
+def tip_velocity(trace: Trace) -> Array:
+    """Velocity of the tip (rows, 3) [m/s]."""
+    velocity: Array = np.gradient(trace.block("tip"), trace["t_s"], axis=0)
+    return velocity
+
+
+def velocity_error(trace: Trace, command: str) -> float:
+    """RMS distance of the tip's velocity from `command` over the free ticks [m/s]; NaN without any."""
+    free = free_ticks(trace)
+    error = np.linalg.norm(tip_velocity(trace) - trace.block(command), axis=1)[free]
+    return rms(error) if error.size else math.nan
+
+
+def energy_residual(trace: Trace) -> Array:
+    """What the energy ledger of the whole system does not explain, at every tick (rows,) [J].
+
+    Sum of the absolute residuals of its parts, so that none can hide another:
+
+        tanks and channels   change of T_o + T_r, + in flight + lost + overflow - deficit + W_handle + W_tip
+        console              kinetic + potential - motors - hand + damping + friction
+        arm                  kinetic + potential + springs - actuators - applied - contact + losses
+        tip                  W_tip as booked by the tank + the contact's work on the arm as the plant has it
+
+    The last one where nothing but the tip has contact. Rows of a trace without a ledger are NaN.
+    """
+    if "energy_residual" not in trace:
+        return np.full(len(trace), np.nan)
+    total = np.abs(trace["console_residual_j"]) + np.abs(trace["energy_residual_j"])
+    if np.isfinite(trace["tank_account_residual_j"]).all():
+        total += np.abs(trace["tank_account_residual_j"])
+    if not any(name in trace for name in _ALONE):
+        contact = trace["energy_contact_work_j"]  # one row late: of the instant at which the last step began
+        total[:-1] += np.abs(trace["environment_work_j"][:-1] + contact[1:])
+    return total
+
+
+def energy_exchanged(trace: Trace) -> float:
+    """Energy that went to and fro between the system, the operator and what the tip touches [J]."""
+    works = (trace["hand_work_j"], trace["environment_work_j"])
+    return float(sum(np.abs(np.diff(work)).sum() for work in works))
+
+
+def _residual_fraction(trace: Trace) -> float:
+    exchanged = energy_exchanged(trace)
+    return float(np.max(energy_residual(trace))) / exchanged if exchanged > 0.0 else math.nan
+
+
+def _tank_min(trace: Trace) -> float:
+    if not np.isfinite(trace["tank_account_residual_j"]).all():
+        return math.nan
+    return float(min(trace["tank_operator_j"].min(), trace["tank_remote_j"].min()))
+
+
+def plane_overshoot(trace: Trace) -> float:
+    """How far the tip got past a virtual wall of the resolver [m], 0 if never; NaN without walls."""
+    resolver = trace.meta.scenario["controller"]["resolver"]
+    past = [0.0]
+    for plane in resolver.get("planes", ()):
+        normal = np.array(plane["normal"], dtype=float)
+        normal /= np.linalg.norm(normal)
+        past.append(float(np.max(trace.block("tip") @ normal)) - plane["offset_m"])
+    return max(past) if len(past) > 1 else math.nan
+
+
+def task_time(trace: Trace) -> float:
+    """When the operator had done with all goals [s]; NaN if never."""
+    done = np.flatnonzero(trace["operator_done"] > 0.0)
+    return float(trace["t_s"][done[0]]) if done.size else math.nan
+
+
+METRICS = (
+    Metric(
+        name="velocity_error_rms_mm_per_s",
+        meaning="RMS of tip velocity less the command that acts now, while no constraint is active",
+        compute=_teleoperated(lambda trace: 1e3 * velocity_error(trace, "velocity_command")),
+    ),
+    Metric(
+        name="velocity_error_unaligned_rms_mm_per_s",
+        meaning="the same against what the master does now: the channel's delay included",
+        compute=_teleoperated(lambda trace: 1e3 * velocity_error(trace, "velocity_issued")),
+    ),
+    Metric(
+        name="tank_min_j",
+        meaning="lowest level of the two energy tanks",
+        compute=_teleoperated(_tank_min),
+        lower_is_better=False,
+    ),
+    Metric(
+        name="delivered_max_j",
+        meaning="largest net energy that hand and surroundings got; above 0 is active behaviour",
+        compute=_teleoperated(lambda trace: float(np.max(trace["delivered_j"]))),
+    ),
+    Metric(
+        name="energy_residual_j",
+        meaning="largest energy that the ledger of the whole system does not explain",
+        compute=_teleoperated(lambda trace: float(np.max(energy_residual(trace)))),
+    ),
+    Metric(
+        name="energy_residual_fraction",
+        meaning="the same over the energy exchanged with operator and surroundings",
+        compute=_teleoperated(_residual_fraction),
+    ),
+    Metric(
+        name="master_force_max_n",
+        meaning="largest force rendered at the master's handle",
+        compute=_of("master_force", lambda trace: largest(trace, "master_force")),
+        lower_is_better=None,
+    ),
+    Metric(
+        name="plane_overshoot_max_mm",
+        meaning="how far the tip got past a virtual wall",
+        compute=_teleoperated(lambda trace: 1e3 * plane_overshoot(trace)),
+    ),
+    Metric(
+        name="slack_rms_mm_per_s",
+        meaning="RMS of the tip velocity that the controller gave up",
+        compute=_of("slack", lambda trace: 1e3 * rms(np.linalg.norm(trace.block("slack"), axis=1))),
+        lower_is_better=None,
+    ),
+    Metric(
+        name="passivity_active_fraction",
+        meaning="fraction of ticks in which the energy budget limits the tip",
+        compute=_of("passivity_active", lambda trace: float(np.mean(trace["passivity_active"]))),
+        lower_is_better=None,
+    ),
+    Metric(
+        name="relaxed_ticks",
+        meaning="ticks in which the acceleration bounds gave way to hard rows",
+        compute=_of("qp_relaxed", lambda trace: float(np.sum(trace["qp_relaxed"]))),
+    ),
+    Metric(
+        name="goals_missed",
+        meaning="goals that the operator gave up",
+        compute=_teleoperated(lambda trace: float(trace["goals_missed"][-1])),
+    ),
+    Metric(
+        name="task_time_s",
+        meaning="time after which the operator had done with all goals",
+        compute=_teleoperated(task_time),
+    ),
+)

@@ -1,0 +1,119 @@
+"""Shapes between which forbidden contacts are looked for: capsules along the arm, patient and table.
+
+They are no geoms of the model: they are seen, exert no force and are not drawn, and they are there whether
+the theatre is drawn or not. Capsules lie inside or close to the drawn links, the patient is the drawn
+abdomen's ellipsoid, the table a box.
+"""
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from surgsim.models.config import SceneConfig
+from surgsim.models.graft import asset
+from surgsim.models.theatre import patient_place
+
+Array = NDArray[np.float64]
+Ids = NDArray[np.intp]
+Capsule = tuple[tuple[float, float, float], tuple[float, float, float], float]
+
+_LWR4PLUS: tuple[Capsule, ...] = (
+    ((0.0, 0.0, 0.03), (0.0, 0.0, 0.10), 0.085),
+    ((0.0, 0.0, -0.15), (0.0, 0.0, 0.0), 0.066),
+    ((0.0, 0.0, 0.0), (0.0, 0.0, 0.14), 0.066),
+    ((0.0, 0.0, -0.14), (0.0, 0.0, 0.0), 0.066),
+    ((0.0, 0.0, 0.0), (0.0, 0.0, 0.14), 0.066),
+    ((0.0, 0.0, -0.13), (0.0, 0.0, 0.0), 0.055),
+    ((0.0, 0.0, -0.01), (0.0, 0.0, 0.01), 0.055),
+    ((0.0, 0.0, 0.03), (0.0, 0.0, 0.04), 0.038),
+)
+_PANDA: tuple[Capsule, ...] = (
+    ((0.0, 0.0, 0.03), (0.0, 0.0, 0.10), 0.085),
+    ((0.0, 0.0, -0.14), (0.0, 0.0, 0.0), 0.059),
+    ((0.0, 0.0, 0.0), (0.0, -0.14, 0.0), 0.059),
+    ((0.0, 0.0, -0.08), (0.0825, 0.0, 0.0), 0.055),
+    ((0.0, 0.0, 0.0), (-0.0825, 0.08, 0.0), 0.055),
+    ((0.0, 0.0, -0.21), (0.0, 0.0, 0.0), 0.052),
+    ((0.0, 0.0, 0.0), (0.088, 0.0, 0.0), 0.049),
+    ((0.0, 0.0, 0.0), (0.0, 0.0, 0.062), 0.045),
+)
+LINKS = ("base", *(f"link{i}" for i in range(1, 8)))
+_ARMS = {"lwr4plus": _LWR4PLUS, "panda": _PANDA}
+"""End points [m] in the body's frame and radius [m] of each of `LINKS`."""
+_ADAPTER_RADIUS_M = 0.026
+_NEXT_THAT_CAN_TOUCH = 3  # along the chain: nearer ones are held apart by the joints' ranges
+_TABLE_CENTRE_M, _TABLE_HALF_M = (0.0, -0.13, -0.223), (0.268, 0.98, 0.054)  # pads and top of the drawn table
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class CollisionShapes:
+    """Where forbidden contacts are looked for.
+
+    Attributes:
+        names: Of the n capsules, from the base on; with an instrument the last two are its adapter and shaft.
+        bodies: The body that each is fixed to (n,).
+        ends: End points in the body's frame (n, 2, 3) [m].
+        radii: (n,) [m].
+        pairs: Capsules that can touch each other (m, 2).
+        shaft: Row of the shaft, -1 without an instrument.
+        patient: Rows: centre of the abdomen from the port, cosine and sine of its turn about the vertical
+            and 0, semi-axes, centre of the table in the patient's frame, its half sizes (5, 3) [m]; (0, 3)
+            without trocar.
+    """
+
+    names: tuple[str, ...]
+    bodies: Ids
+    ends: Array
+    radii: Array
+    pairs: Ids
+    shaft: int
+    patient: Array
+
+
+def collision_shapes(model: mujoco.MjModel, config: SceneConfig) -> CollisionShapes:
+    """Shapes of the scene that `model` was compiled from."""
+    capsules = {name: (name, *capsule) for name, capsule in zip(LINKS, _ARMS[config.robot.name], strict=True)}
+    if config.instrument is not None:
+        entry, tip = config.instrument.adapter_length_m, config.instrument.shaft_length_m
+        tip += entry
+        below = (0.0, 0.0, max(0.0, entry - _ADAPTER_RADIUS_M))
+        capsules["adapter"] = ("instrument", (0.0, 0.0, 0.0), below, _ADAPTER_RADIUS_M)
+        radius = 0.5 * config.instrument.shaft_diameter_m
+        capsules["shaft"] = ("instrument", (0.0, 0.0, entry), (0.0, 0.0, tip - radius), radius)
+    names = tuple(capsules)
+    return CollisionShapes(
+        names=names,
+        bodies=np.array([model.body(body).id for body, *_ in capsules.values()], dtype=np.intp),
+        ends=np.array([[one, other] for _, one, other, _ in capsules.values()]),
+        radii=np.array([radius for *_, radius in capsules.values()]),
+        pairs=_pairs(names),
+        shaft=names.index("shaft") if "shaft" in names else -1,
+        patient=_patient(config),
+    )
+
+
+def _pairs(names: tuple[str, ...]) -> Ids:
+    """Capsules that are far enough apart along the chain; the bent wrist holds the adapter beside link 5."""
+    count, near = len(names), {("link5", "adapter")}
+    pairs = [(i, j) for i in range(count) for j in range(i + _NEXT_THAT_CAN_TOUCH, count)]
+    return np.array([pair for pair in pairs if (names[pair[0]], names[pair[1]]) not in near], dtype=np.intp)
+
+
+def _patient(config: SceneConfig) -> Array:
+    if config.trocar is None:
+        return np.zeros((0, 3))
+    centre, heading = patient_place(config, config.trocar, abdomen_semi_axes())
+    turn = [np.cos(heading), np.sin(heading), 0.0]
+    offset = centre - np.array(config.trocar.position_m)
+    return np.array([offset, turn, abdomen_semi_axes(), _TABLE_CENTRE_M, _TABLE_HALF_M])
+
+
+@lru_cache(maxsize=1)
+def abdomen_semi_axes() -> Array:
+    """Semi-axes (3,) [m] of the drawn abdomen, read-only."""
+    size = np.array(asset("theatre/patient.xml").geom("abdomen").size)
+    size.flags.writeable = False
+    return size

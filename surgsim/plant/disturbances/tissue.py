@@ -1,0 +1,136 @@
+"""Soft tissue that the tip presses on and drags through."""
+
+from typing import Annotated, Literal
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field, model_validator
+
+from surgsim.compiled import compiled
+from surgsim.errors import SurgsimError
+from surgsim.models.build import Scene
+from surgsim.models.config import Vec3
+from surgsim.plant.disturbances.base import Disturbance, DisturbanceConfig, Spread, spread_factor
+from surgsim.spatial import cross, unit
+
+Array = NDArray[np.float64]
+FADE_M = 0.0005
+"""d_0: damping and drag fade in over this depth, so that the force is continuous at touch."""
+LIGHTEST_TIP_KG = 0.2
+"""Least effective mass that the timestep is checked for; the shipped arms' tips have 0.24 kg and more."""
+_SITE = mujoco.mjtObj.mjOBJ_SITE
+
+
+class TissueConfig(DisturbanceConfig):
+    """Soft tissue below a plane, fixed in the world: stiff and damped along its normal, viscous across it.
+
+    The stiffness is that of a flat punch of 8 mm diameter, 2 a E / (1 - nu^2), on incompressible tissue with
+    E = 20 kPa: 213 N/m. Damping and drag are assumed.
+
+    Attributes:
+        point_m: A point of the plane, world frame [m].
+        normal: Direction out of the tissue; any length but zero.
+        stiffness_n_per_m: Along the normal [N/m].
+        damping_n_s_per_m: Along the normal [N s/m].
+        drag_n_s_per_m: Across the normal [N s/m].
+        spread: Relative spread of all three over seeds.
+    """
+
+    type: Literal["tissue"] = "tissue"
+    point_m: Vec3 = (0.0, 0.55, 0.025)
+    normal: Vec3 = (0.0, 0.0, 1.0)
+    stiffness_n_per_m: Annotated[float, Field(ge=0.0, le=20000.0)] = 200.0
+    damping_n_s_per_m: Annotated[float, Field(ge=0.0, le=200.0)] = 2.0
+    drag_n_s_per_m: Annotated[float, Field(ge=0.0, le=200.0)] = 5.0
+    spread: Spread = 0.0
+
+    @model_validator(mode="after")
+    def _is_a_direction(self) -> "TissueConfig":
+        if not any(self.normal):
+            raise ValueError("tissue: normal must not be zero")
+        return self
+
+    def build(self, rng: np.random.Generator) -> "Tissue":
+        """The disturbance, its stiffness, damping and drag drawn."""
+        drawn = spread_factor(rng, self.spread, 3)
+        law = drawn * (self.stiffness_n_per_m, self.damping_n_s_per_m, self.drag_n_s_per_m)
+        return Tissue(np.array(self.point_m), unit(np.array(self.normal)), law)
+
+
+class Tissue(Disturbance):
+    """A spring that only pushes, with damping, and drag across it.
+
+    Force on the tip at the depth p = n . (p_0 - p_WT) > 0 with velocity v, normal n and s = min(1, p / d_0):
+
+        f = max(0, k p - b s n . v) n - c s (v - n (n . v))
+
+    The elastic part has the potential k p^2 / 2, the rest takes energy out; the tissue never pulls, and the
+    force is continuous at touch. It acts at the tip on the jaws, whose sensor measures it. The tissue itself
+    does not move, with the breath neither.
+
+    Args:
+        point: A point of the plane (3,) [m].
+        normal: n (3,).
+        law: k [N/m], b, c [N s/m] (3,).
+    """
+
+    touches_tip = True
+
+    def __init__(self, point: Array, normal: Array, law: Array) -> None:
+        self._point, self._normal, self._law = point, normal, law
+        self._jaws = -1
+        self._velocity = np.zeros(6)
+
+    def modify(self, spec: mujoco.MjSpec) -> None:
+        """Refuse a scene without an instrument, and a timestep that the tissue's law cannot be stepped with.
+
+        An explicit spring k with damping b on the mass m is stable for k h^2 + 2 b h < 4 m with timestep h; a
+        quarter of that is asked for.
+        """
+        if all(body.name != "jaws" for body in spec.bodies):
+            raise SurgsimError("disturbance 'tissue' needs an instrument, and the scenario has none")
+        h = float(spec.option.timestep)
+        k, b = float(self._law[0]), float(self._law[1:].max())
+        if k * h**2 + b * h > LIGHTEST_TIP_KG:
+            raise SurgsimError(
+                f"disturbance 'tissue': k h^2 + b h must be at most {LIGHTEST_TIP_KG:g} kg with "
+                f"stiffness k {k:g} N/m, damping or drag b {b:g} N s/m and timestep_s h {h:g}, not "
+                f"{k * h**2 + b * h:.3g} kg"
+            )
+
+    def start(self, scene: Scene, data: mujoco.MjData, rng: np.random.Generator, dt_s: float) -> None:
+        """Nothing to forget; finds the jaws."""
+        self._jaws = int(scene.model.body("jaws").id)
+
+    def push(self, t_s: float, scene: Scene, data: mujoco.MjData) -> None:
+        """Add the force of the tissue."""
+        tip = data.site_xpos[scene.tip_site]
+        if self._normal @ (self._point - tip) <= 0.0:
+            return
+        mujoco.mj_objectVelocity(scene.model, data, _SITE, scene.tip_site, self._velocity, 0)
+        force = tissue_force(tip, self._velocity[3:], self._point, self._normal, self._law)
+        applied = data.xfrc_applied[self._jaws]
+        applied[:3] += force
+        applied[3:] += cross(tip - data.xipos[self._jaws], force)
+
+
+@compiled
+def tissue_force(tip: Array, velocity: Array, point: Array, normal: Array, law: Array) -> Array:
+    """Force of the tissue on the tip (3,) [N].
+
+    Args:
+        tip: p_WT (3,) [m].
+        velocity: v (3,) [m/s].
+        point: A point of the plane (3,) [m].
+        normal: n (3,).
+        law: k, b, c (3,).
+    """
+    p = np.dot(normal, point - tip)
+    if p <= 0.0:
+        return np.zeros(3)
+    share = min(1.0, p / FADE_M)
+    rate = np.dot(normal, velocity)
+    pressure = max(0.0, law[0] * p - law[1] * share * rate)
+    force: Array = pressure * normal - law[2] * share * (velocity - rate * normal)
+    return force

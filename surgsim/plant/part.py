@@ -1,0 +1,71 @@
+"""Interface of what a scenario adds to the plant: disturbances and props."""
+
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from surgsim.columns import Block
+from surgsim.models.build import Scene
+from surgsim.plant.state import State
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PortMotion:
+    """How far the incision's rest place has moved, world frame.
+
+    Attributes:
+        offset: From its configured place (3,) [m].
+        velocity: (3,) [m/s].
+    """
+
+    offset: Array
+    velocity: Array
+
+
+class PlantPart:
+    """A part of the plant. Subclasses override the hooks that they need; the others do nothing.
+
+    A config builds it with its own random generator, from which its values are drawn if they have a spread:
+    the same seed gives the same values.
+
+    Attributes:
+        columns: What it adds to the trace.
+        touches_tip: Whether it can press on the instrument's tip, so that the force there is measured.
+        rank: Where it stands in the chains of `actuate` and `sense`: lower first, then as in the scenario.
+    """
+
+    columns: tuple[Block, ...] = ()
+    touches_tip: bool = False
+    rank: int = 0
+
+    def modify(self, spec: mujoco.MjSpec) -> None:
+        """Change the model before it is compiled."""
+
+    def start(self, scene: Scene, data: mujoco.MjData, rng: np.random.Generator, dt_s: float) -> None:
+        """Forget the last run. `rng` is the part's own, `dt_s` the control period [s]."""
+
+    def actuate(self, torque: Array) -> Array:
+        """Torque (7,) [N m] that reaches the joints in this period, given the one commanded; once a tick."""
+        return torque
+
+    def grip(self, jaw: float) -> None:
+        """The instrument's jaws are told to be closed by `jaw`, from 0 (open) to 1; once a tick."""
+
+    def push(self, t_s: float, scene: Scene, data: mujoco.MjData) -> None:
+        """Add forces at `t_s` [s] to `data.xfrc_applied` or `data.qfrc_applied`, zeroed before every step."""
+
+    def port_motion(self, t_s: float) -> PortMotion | None:
+        """Motion of the incision's rest place at `t_s` [s]."""
+        return None
+
+    def sense(self, state: State) -> State:
+        """What is measured of `state`; once a tick, in the order of the ranks."""
+        return state
+
+    def values(self) -> Array:
+        """Values of `columns` now."""
+        return np.zeros(0)

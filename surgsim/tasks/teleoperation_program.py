@@ -1,0 +1,84 @@
+"""What a teleoperating person is to do: goals in a scenario, or those of a peg board."""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field, NonNegativeFloat, PositiveFloat
+
+from surgsim.catalog import PartConfig
+from surgsim.models.config import Vec3
+from surgsim.models.peg_board import PegBoardLayout, transfer_goals
+from surgsim.teleop.operator import Goal
+
+Array = NDArray[np.float64]
+_STEP_M = 0.005
+_ABOVE_M = 0.001
+
+
+class GoalConfig(PartConfig):
+    """One step of the operator's program.
+
+    Attributes:
+        position_m: Where the tip shall be, world frame [m]; may lie beyond a wall.
+        tolerance_m: How near is near enough; half the target width of Fitts' law [m].
+        dwell_s: How long the tip is to be seen there, or a push to last [s].
+        jaw: How far the jaws close during this goal, from 0 (open) to 1.
+        push: Go there once, without correcting by sight, and stay for `dwell_s`.
+        timeout_s: After this the operator gives up and takes the next goal; null: never [s].
+    """
+
+    position_m: Vec3
+    tolerance_m: PositiveFloat = 0.002
+    dwell_s: NonNegativeFloat = 0.2
+    jaw: float = Field(default=0.0, ge=0.0, le=1.0)
+    push: bool = False
+    timeout_s: PositiveFloat | None = None
+
+    def goal(self) -> Goal:
+        """The operator's goal."""
+        return Goal(
+            position=self.position_m,
+            tolerance_m=self.tolerance_m,
+            dwell_s=self.dwell_s,
+            jaw=self.jaw,
+            push=self.push,
+            timeout_s=math.inf if self.timeout_s is None else self.timeout_s,
+        )
+
+
+def board_goals(layout: PegBoardLayout, timeout_s: float) -> tuple[Goal, ...]:
+    """The goals that bring every ring of a board to its target; each is given up after `timeout_s` [s].
+
+    All are 1 mm higher than `transfer_goals` has them: a hand that is 1 mm off would press on the rim.
+    """
+    up = _ABOVE_M * layout.R_WB[:, 2]
+    return tuple(
+        Goal(
+            position=_triple(step.position + up),
+            tolerance_m=step.tolerance_m,
+            dwell_s=step.dwell_s,
+            jaw=step.jaw,
+            timeout_s=timeout_s,
+        )
+        for step in transfer_goals(layout)
+    )
+
+
+def _triple(p: Array) -> tuple[float, float, float]:
+    return float(p[0]), float(p[1]), float(p[2])
+
+
+def way_points(start: Array, goals: tuple[Goal, ...]) -> list[tuple[str, Array]]:
+    """Straight ways between the goals that are not pushes, in steps of 5 mm, each point with its name."""
+    points, here = [("the start", np.array(start))], np.array(start)
+    for number, goal in enumerate(goals, 1):
+        if goal.push:
+            continue
+        way = np.array(goal.position) - here
+        count = max(math.ceil(float(np.linalg.norm(way)) / _STEP_M), 1)
+        points += [
+            (f"on the way to goal {number} the point", here + way * i / count) for i in range(1, count + 1)
+        ]
+        here = here + way
+    return points

@@ -1,0 +1,1 @@
+"""Delayed bilateral teleoperation: console, operator, channel, energy tanks and the two ends."""

@@ -1,0 +1,66 @@
+"""A hand that follows a person's input."""
+
+import math
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from surgsim.teleop.console import ConsoleState
+from surgsim.teleop.impedance import hand_wrench
+from surgsim.teleop.live.intent import Intent, Source
+from surgsim.teleop.mapping import MappingConfig, rotation_matrix
+from surgsim.teleop.operator import HandCommand, OperatorConfig
+
+Array = NDArray[np.float64]
+EASE_S = 0.05
+LEAD_M = 0.05
+
+
+class LiveHand:
+    """Holds the handle as the simulated operator does, but goes where `source` says, and without tremor.
+
+        v' = (R_OW u / s - v) / EASE_S,   x' = v,   |x - x_o| <= LEAD_M
+
+    u is the wanted velocity of the tip, x and v the hand's intended motion in console axes O. The lead is
+    limited because a person at a key does not feel the force: without the limit a push against a wall would
+    wind the intention up, to be undone before the tip comes back.
+
+    Args:
+        config: The hand's impedance and how fast it closes the grip.
+        mapping: Scale s and rotation R_WO between console and world.
+        source: The person's input.
+        period_s: Control period.
+    """
+
+    def __init__(
+        self, config: OperatorConfig, mapping: MappingConfig, source: Source, period_s: float
+    ) -> None:
+        self._c, self._source, self._period = config, source, period_s
+        self._R_OW = rotation_matrix(mapping.rotation_wxyz).T / mapping.scale
+        self._blur = 1.0 - math.exp(-period_s / EASE_S)
+        self._jaw_step = period_s / config.jaw_time_s
+        self._velocity = np.zeros(3)
+        self._position: Array | None = None
+        self._jaw = 0.0
+
+    def step(self, t_s: float, seen_tip: ArrayLike, handle: ConsoleState) -> HandCommand:
+        """What the hand does in the period from `t_s` [s]; what it sees is for the person to judge."""
+        if self._position is None:
+            self._position, self._upright = handle.position, handle.rotation
+        intent = self._source(t_s)
+        intended = self._position = self._moved(self._position, intent, handle)
+        self._jaw += min(max(intent.jaw - self._jaw, -self._jaw_step), self._jaw_step)
+        return HandCommand(
+            wrench=hand_wrench(self._c, intended, self._velocity, self._upright, handle),
+            jaw=self._jaw,
+            goal=0,
+            done=intent.end,
+            missed=0,
+            intended=intended,
+        )
+
+    def _moved(self, position: Array, intent: Intent, handle: ConsoleState) -> Array:
+        self._velocity = self._velocity + self._blur * (self._R_OW @ intent.velocity - self._velocity)
+        lead = position + self._period * self._velocity - handle.position
+        length = math.sqrt(float(lead @ lead))
+        return np.asarray(handle.position + lead * (LEAD_M / max(length, LEAD_M)))

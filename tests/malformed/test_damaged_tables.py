@@ -1,0 +1,260 @@
+"""Results folders of a batch that an edit, a kill or a full disk has spoilt: refused, or done again."""
+
+import json
+import os
+import random
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+
+from surgsim.cli.main import main
+from surgsim.compare.table import read_table
+from surgsim.errors import SurgsimError
+from surgsim.recording.sealed import read_sealed, sealed
+
+SUITE = """name: made
+scenarios: [circle_lwr4plus]
+controllers: [pinv, vprnn]
+seeds: "0:2"
+settings:
+  - task.duration_s=0.3
+  - task.ramp_s=0.1
+  - task.hold_start_s=0
+  - task.hold_end_s=0
+"""
+RUN = Path("runs/circle_lwr4plus/vprnn/base-seed1")
+NONE = "holds no runs.parquet"
+RESUME = ("compare", "suite.yaml", "--jobs", "1", "--out", "out", "--resume")
+
+
+@pytest.fixture(scope="session")
+def whole(tmp_path_factory) -> Path:
+    """A finished batch, with its suite beside it."""
+    folder = tmp_path_factory.mktemp("batch")
+    (folder / "suite.yaml").write_text(SUITE)
+    before = Path.cwd()
+    os.chdir(folder)
+    try:
+        assert main(["compare", "suite.yaml", "--jobs", "1", "--out", "out"]) == 0
+    finally:
+        os.chdir(before)
+    return folder
+
+
+@pytest.fixture
+def batch(whole, tmp_path) -> Path:
+    """A copy of the batch in the folder that commands run in."""
+    shutil.copytree(whole, tmp_path, dirs_exist_ok=True)
+    return tmp_path / "out"
+
+
+def _bytes(change: Callable[[bytes], bytes]) -> Callable[[Path], None]:
+    return lambda path: path.write_bytes(change(path.read_bytes()))
+
+
+def _table(change: Callable[[pa.Table], pa.Table]) -> Callable[[Path], None]:
+    return lambda path: pq.write_table(change(pq.read_table(path)), path)
+
+
+def _column(name: str, values: Callable[[list[Any]], list[Any]]) -> Callable[[pa.Table], pa.Table]:
+    def change(table: pa.Table) -> pa.Table:
+        column = pa.array(values(table[name].to_pylist()))
+        return table.set_column(table.schema.get_field_index(name), name, column)
+
+    return change
+
+
+def _pipe(path: Path) -> None:
+    path.unlink()
+    os.mkfifo(path)
+
+
+def _folder(path: Path) -> None:
+    path.unlink()
+    path.mkdir()
+
+
+def _loop(path: Path) -> None:
+    path.unlink()
+    path.symlink_to(path.name)
+
+
+PARQUET: dict[str, tuple[Callable[[Path], None], str]] = {
+    "gone": (Path.unlink, NONE),
+    "empty": (_bytes(lambda data: b""), "is damaged: "),
+    "half": (_bytes(lambda data: data[: len(data) // 2]), "is damaged: "),
+    "without its end": (_bytes(lambda data: data[:-8]), "is damaged: "),
+    "zeros": (_bytes(lambda data: bytes(len(data))), "is damaged: "),
+    "its middle zero": (_bytes(lambda data: data[:200] + bytes(600) + data[800:]), "is damaged: "),
+    "csv": (_bytes(lambda data: b"run_id,suite\n1,made\n"), "is damaged: "),
+    "png": (_bytes(lambda data: b"\x89PNG\r\n\x1a\n" + data), "is damaged: "),
+    "pipe": (_pipe, NONE),
+    "folder": (_folder, NONE),
+    "loop": (_loop, NONE),
+    "no column": (_table(lambda table: table.drop_columns(["seed"])), "has no column 'seed'"),
+    "another table": (_table(lambda table: pa.table({"a": [1]})), "has no column 'run_id'"),
+    "no rows": (_table(lambda table: table.slice(0, 0)), "has no rows"),
+    "a row less": (_table(lambda table: table.slice(1)), "does not hold what `surgsim compare` wrote"),
+    "a row twice": (_table(lambda table: pa.concat_tables([table, table.slice(0, 1)])), "does not hold what"),
+    "rows in another order": (_table(lambda table: table.take([1, 0, 2, 3])), "does not hold what"),
+    "text for seeds": (
+        _table(_column("seed", lambda found: [str(seed) for seed in found])),
+        "'seed' holds string",
+    ),
+    "a better figure": (
+        _table(_column("tip_error_rms_mm", lambda found: [0.5 * found[0], *found[1:]])),
+        "does not hold what",
+    ),
+    "another outcome": (
+        _table(_column("outcome", lambda found: ["diverged", *found[1:]])),
+        "does not hold what",
+    ),
+    "no seal": (_table(lambda table: table.replace_schema_metadata(None)), "does not hold what"),
+}
+
+
+@pytest.mark.parametrize("command", [("report", "out"), ("inspect", "out", "--run", "x")])
+@pytest.mark.parametrize("name", PARQUET)
+def test_damaged_tables(name: str, command: tuple[str, ...], batch, refused) -> None:
+    spoil, reason = PARQUET[name]
+    spoil(batch / "runs.parquet")
+    (batch / "report.html").unlink()
+    line = refused(*command)
+    assert reason in line or (reason == NONE and "the batch is not finished" in line)
+    assert line.startswith("out")
+    assert not (batch / "report.html").exists()
+
+
+def test_no_flipped_bit_changes_a_table(batch) -> None:
+    path, rng = batch / "runs.parquet", random.Random(2)
+    table, data = read_table(batch), path.read_bytes()
+    refusals = 0
+    for _ in range(300):
+        place = rng.randrange(len(data))
+        flipped = bytes([data[place] ^ 1 << rng.randrange(8)])
+        path.write_bytes(data[:place] + flipped + data[place + 1 :])
+        reason = _refusal(batch, table)
+        assert reason.isprintable()
+        refusals += bool(reason)
+    assert refusals > 50
+
+
+def _refusal(folder: Path, table: pa.Table) -> str:
+    """Why the table is refused; empty if it is read and is `table`."""
+    try:
+        assert read_table(folder).equals(table)
+    except SurgsimError as error:
+        return str(error)
+    return ""
+
+
+def _edited(**changes: Any) -> Callable[[Path], None]:
+    """Sealed again after the change: an edit by a program, not by the disk."""
+
+    def spoil(path: Path) -> None:
+        content = read_sealed(path)
+        path.write_text(json.dumps(sealed({**content, **changes})))
+
+    return spoil
+
+
+def _text(old: str, new: str) -> Callable[[Path], None]:
+    def spoil(path: Path) -> None:
+        text = path.read_text()
+        assert old in text
+        path.write_text(text.replace(old, new, 1))
+
+    return spoil
+
+
+SUITE_JSON: dict[str, tuple[Callable[[Path], None], str]] = {
+    "empty": (_bytes(lambda data: b""), "suite.json is damaged: "),
+    "half": (_bytes(lambda data: data[: len(data) // 2]), "suite.json is damaged: "),
+    "zeros": (_bytes(lambda data: bytes(len(data))), "suite.json is damaged: "),
+    "latin 1": (_bytes(lambda data: b"\xf6" + data), "suite.json is damaged: "),
+    "list": (_bytes(lambda data: b"[1]"), "suite.json is damaged: it holds no object"),
+    "deep": (_bytes(lambda data: b"[" * 100_000), "suite.json is damaged: it is nested too deeply"),
+    "a version changed": (_text('"python": "3.', '"python": "4.'), "suite.json is damaged: it does not hold"),
+    "no seal": (_bytes(lambda data: b'{"name": "made"}'), "suite.json is damaged: it has no sha256"),
+}
+
+
+@pytest.mark.parametrize("command", [("report", "out"), RESUME])
+@pytest.mark.parametrize("name", SUITE_JSON)
+def test_damaged_suite_json(name: str, command: tuple[str, ...], batch, refused) -> None:
+    spoil, reason = SUITE_JSON[name]
+    spoil(batch / "suite.json")
+    assert reason in refused(*command)
+
+
+@pytest.mark.parametrize(
+    ("changes", "reason"),
+    [
+        ({"schema_version": 2}, "out holds the results of another suite, or of other settings"),
+        ({"seeds": "0:3"}, "out holds the results of another suite, or of other settings"),
+        ({"settings": []}, "out holds the results of another suite, or of other settings"),
+    ],
+)
+def test_results_of_another_suite(changes: dict[str, Any], reason: str, batch, refused) -> None:
+    _edited(**changes)(batch / "suite.json")
+    assert refused(*RESUME) == reason
+
+
+@pytest.mark.parametrize("name", ["suite.json", "runs.parquet"])
+def test_results_without_resume(name: str, batch, refused) -> None:
+    (batch / name).unlink()
+    line = refused(*RESUME[:-1])
+    assert line.startswith("out holds ")
+
+
+METRICS_JSON: dict[str, Callable[[Path], None]] = {
+    "gone": Path.unlink,
+    "empty": _bytes(lambda data: b""),
+    "half": _bytes(lambda data: data[: len(data) // 2]),
+    "zeros": _bytes(lambda data: bytes(len(data))),
+    "list": _bytes(lambda data: b"[]"),
+    "deep": _bytes(lambda data: b"[" * 100_000),
+    "latin 1": _bytes(lambda data: data.replace(b"vprnn", b"vpr\xf6\xf6")),
+    "a figure changed": _text('"tip_error_rms_mm": ', '"tip_error_rms_mm": 9'),
+    "an outcome changed": _text('"completed"', '"diverged"'),
+    "no seal": _bytes(lambda data: b'{"scenario": "circle_lwr4plus"}'),
+    "pipe": _pipe,
+    "folder": _folder,
+    "loop": _loop,
+}
+
+
+@pytest.mark.parametrize("name", METRICS_JSON)
+def test_a_damaged_run_is_not_counted_but_done_again(name: str, batch, whole, monkeypatch) -> None:
+    """Resuming is the cure: the run is found not to be whole, and only it is run."""
+    monkeypatch.chdir(batch.parent)
+    METRICS_JSON[name](batch / RUN / "metrics.json")
+    others = {
+        path: path.stat().st_mtime_ns
+        for path in batch.glob("runs/*/*/*/metrics.json")
+        if RUN.name not in str(path)
+    }
+    monkeypatch.setattr("surgsim.compare.workers.run_jobs", _here)
+    assert main(list(RESUME)) == 0
+    assert {path: path.stat().st_mtime_ns for path in others} == others
+    again, first = (read_table(folder).to_pylist() for folder in (batch, whole / "out"))
+    keys = ("run_id", "outcome", "tip_error_rms_mm", "rcm_error_max_mm")
+    assert [[row[key] for key in keys] for row in again] == [[row[key] for key in keys] for row in first]
+
+
+def _here(jobs, count):
+    """Runs the jobs in this process."""
+    from surgsim.compare.job import do
+    from surgsim.compare.workers import Done
+
+    assert len(jobs) == 1
+    yield Done(index=0, outcome=do(jobs[0]))
+
+
+def test_there_are_enough() -> None:
+    assert len(PARQUET) + len(SUITE_JSON) + len(METRICS_JSON) >= 40

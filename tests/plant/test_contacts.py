@@ -1,0 +1,110 @@
+"""Forbidden contacts: distances against brute force, shapes against the drawing, and what is found where."""
+
+import mujoco
+import numpy as np
+import pytest
+
+from surgsim.models.build import build
+from surgsim.models.collision import abdomen_semi_axes
+from surgsim.models.config import RobotConfig, SceneConfig, TrocarConfig
+from surgsim.plant.contacts import ContactWatch, body_depth, segment_distance_squared, table_depth
+from surgsim.scenario.load import load_scenario, shipped
+from surgsim.simulate.setup import prepare
+
+PORT = (0.0, 0.55, 0.2)
+SCENE = SceneConfig(robot=RobotConfig(name="lwr4plus"), trocar=TrocarConfig(position_m=PORT), theatre=False)
+SHARES = np.linspace(0.0, 1.0, 401)[:, None]
+
+
+def _points(a, b):
+    return a + SHARES * (b - a)
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_segment_distance(seed):
+    a0, a1, b0, b1 = np.random.default_rng(seed).uniform(-1.0, 1.0, (4, 3))
+    gaps = _points(a0, a1)[:, None] - _points(b0, b1)[None]
+    brute = np.sqrt((gaps**2).sum(axis=2)).min()
+    exact = np.sqrt(segment_distance_squared(a0, a1, b0, b1))
+    assert brute - 6e-3 <= exact <= brute + 1e-12
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_depth_in_the_table(seed):
+    rng = np.random.default_rng(seed)
+    p0, p1 = rng.uniform(-0.6, 0.6, (2, 3))
+    centre, half = rng.uniform(-0.1, 0.1, 3), rng.uniform(0.1, 0.2, 3)
+    outside = np.maximum(np.abs(_points(p0, p1) - centre) - half, 0.0)
+    brute = max(0.0, 0.15 - np.linalg.norm(outside, axis=1).min())
+    assert table_depth(p0, p1, 0.15, centre, half) == pytest.approx(brute, abs=3e-3)
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_a_capsule_is_in_the_body_exactly_when_its_axis_is_in_the_larger_ellipsoid(seed):
+    p0, p1 = np.random.default_rng(seed).uniform(-0.5, 0.5, (2, 3))
+    axes = np.array([0.19, 0.3, 0.16])
+    inside = ((_points(p0, p1) / (axes + 0.05)) ** 2).sum(axis=1).min() < 1.0
+    assert (body_depth(p0, p1, 0.05, axes) > 0.0) == inside
+
+
+def _look(q, scene=SCENE, port=PORT):
+    built = build(scene, drawn=False)
+    data = mujoco.MjData(built.model)
+    data.qpos[built.qpos_ids] = q
+    mujoco.mj_kinematics(built.model, data)
+    return ContactWatch(built, data).look(np.array(port))
+
+
+REACHING = np.array([1.5708, -1.9, 0.0, 0.6, 0.0, 0.0, 0.0])
+
+
+def test_patient_and_table_are_there_whether_drawn_or_not_and_move_with_the_port():
+    drawn = SCENE.model_copy(update={"theatre": True})
+    contact = _look(REACHING)
+    assert contact is not None
+    assert contact.with_patient
+    assert _look(REACHING, drawn) == contact
+    assert _look(REACHING, port=(0.0, 3.0, 0.2)) is None
+    assert _look(REACHING, SCENE.model_copy(update={"trocar": None})) is None
+
+
+@pytest.mark.parametrize("robot", ["lwr4plus", "panda"])
+def test_few_configurations_touch_the_arm_itself_and_its_working_posture_does_not(robot):
+    posture = load_scenario(f"circle_{robot}").start.posture_rad
+    scene = build(SceneConfig(robot=RobotConfig(name=robot), theatre=False), drawn=False)
+    data, rng, found = mujoco.MjData(scene.model), np.random.default_rng(0), []
+    watch = ContactWatch(scene, data)
+    for q in [posture, *rng.uniform(scene.limits.q_min, scene.limits.q_max, (4000, 7))]:
+        data.qpos[scene.qpos_ids] = q
+        mujoco.mj_kinematics(scene.model, data)
+        found.append(watch.look(np.full(3, np.nan)))
+    touching = [contact for contact in found if contact is not None]
+    assert found[0] is None
+    assert 0 < len(touching) < 200
+    assert not any(contact.with_patient for contact in touching)
+
+
+@pytest.mark.parametrize("robot", ["lwr4plus", "panda"])
+def test_capsules_are_inside_the_drawn_links_or_near(robot):
+    scene = build(SceneConfig(robot=RobotConfig(name=robot), theatre=False))
+    shapes, data = scene.shapes, mujoco.MjData(scene.model)
+    mujoco.mj_kinematics(scene.model, data)
+    for name, body, ends in zip(shapes.names, shapes.bodies, shapes.ends, strict=True):
+        geoms = np.flatnonzero(scene.model.geom_bodyid == body)
+        middle = data.xpos[body] + data.xmat[body].reshape(3, 3) @ ends.mean(axis=0)
+        near = min(np.linalg.norm(data.geom_xpos[g] - middle) - scene.model.geom_rbound[g] for g in geoms)
+        assert near < 0.0, name
+
+
+def test_the_abdomen_is_the_drawn_one():
+    model = build(SCENE.model_copy(update={"theatre": True})).model
+    np.testing.assert_array_equal(model.geom("abdomen").size, abdomen_semi_axes())
+    centre = model.body("patient").pos
+    np.testing.assert_allclose(build(SCENE).shapes.patient[0] + PORT, centre, atol=1e-12)
+
+
+@pytest.mark.parametrize("name", shipped())
+def test_no_shipped_scenario_starts_in_a_contact(name):
+    setup = prepare(load_scenario(name, assignments=["theatre=false"]))
+    setup.plant.reset(setup.q_start)
+    assert setup.plant.truth().contact is None
