@@ -256,7 +256,8 @@ def test_the_full_suite_leaves_nothing_out():
     elsewhere = {"passive_convex", "rcm_interaction_force"}  # made for an operator, and for a wall
     assert set(suite.controllers) == set(shipped("controllers")) - elsewhere
     assert len(expand(suite, folder)) == 3600
-    assert len(expand(*load_suite("seeds"))) == 480
+    assert len(expand(*load_suite("seeds"))) == 240
+    assert len(expand(*load_suite("nominal"))) == 48
     assert len(expand(*load_suite("quick"))) == 36
 
 
