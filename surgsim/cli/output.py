@@ -56,12 +56,15 @@ def print_table(
 
 
 def print_metrics(title: str, metrics: Mapping[str, float | None]) -> None:
-    """Print a run's metrics with their meanings."""
-    from surgsim.metrics.catalog import METRICS
+    """Print the metrics of a run with their meanings; subjects of which it defines none are left out."""
+    from surgsim.metrics.catalog import GROUPS
 
+    shown = [group for group in GROUPS if any(metrics.get(metric.name) is not None for metric in group)]
     rows = [
-        (name, format_number(value, METRICS[name].digits), METRICS[name].meaning)
-        for name, value in metrics.items()
+        (metric.name, format_number(metrics[metric.name], metric.digits), metric.meaning)
+        for group in shown
+        for metric in group
+        if metric.name in metrics
     ]
     print_table(title, ("metric", "value", "meaning"), rows, right=(1,))
 

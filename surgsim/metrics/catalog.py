@@ -17,8 +17,8 @@ from surgsim.metrics import (
 from surgsim.metrics.metric import Metric
 from surgsim.trace.trace import Trace
 
-METRICS: dict[str, Metric] = {
-    metric.name: metric
+GROUPS: tuple[tuple[Metric, ...], ...] = tuple(
+    tuple(group.METRICS)
     for group in (
         accuracy,
         dexterity,
@@ -31,8 +31,10 @@ METRICS: dict[str, Metric] = {
         teleoperation,
         timing,
     )
-    for metric in group.METRICS
-}
+)
+"""Metrics of one subject, in the order in which they are printed."""
+
+METRICS: dict[str, Metric] = {metric.name: metric for group in GROUPS for metric in group}
 
 
 def compute_metrics(trace: Trace) -> dict[str, float | None]:

@@ -420,6 +420,7 @@ def unshare_works():
     )
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not unshare_works(), reason="this system lets us mount no small disk")
 def test_a_disk_that_is_really_full(whole, tmp_path):
     """On a disk of 40 KiB, made larger for the second call."""

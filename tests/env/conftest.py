@@ -28,7 +28,19 @@ def brief_scenario() -> Callable[[str], Scenario]:
     return brief
 
 
-@pytest.fixture(scope="session", params=shipped())
+def _is_second_twin(name: str) -> bool:
+    """Whether the same scenario on the other arm is tested in its place, but for the circle."""
+    return (
+        name.endswith("_panda") and name != "circle_panda" and name.replace("panda", "lwr4plus") in shipped()
+    )
+
+
+@pytest.fixture(
+    scope="session",
+    params=[
+        pytest.param(name, marks=pytest.mark.slow) if _is_second_twin(name) else name for name in shipped()
+    ],
+)
 def shipped_name(request) -> str:
     """Every shipped scenario."""
     return request.param

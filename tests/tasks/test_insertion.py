@@ -103,7 +103,7 @@ def test_what_cannot_be_inserted_is_refused_with_the_reason():
         prepare(load_scenario("insertion_lwr4plus", assignments=["task.start_m=[0.01, 0.55, 0.23]"]))
 
 
-@pytest.mark.parametrize("robot", ["lwr4plus", "panda"])
+@pytest.mark.parametrize("robot", [pytest.param("lwr4plus", marks=pytest.mark.slow), "panda"])
 @pytest.mark.parametrize("name", ["insertion", "hands_on_insertion"])
 def test_the_shipped_insertions_enter_the_patient_with_the_shaft_in_the_port(name, robot):
     trace = simulate(load_scenario(f"{name}_{robot}", assignments=["theatre=false"]))

@@ -195,33 +195,63 @@ class PassiveQp:
     def _answer(
         self, problem: VelocityProblem, memory: PassiveQpMemory, program: _Program, x: Array, relaxed: float
     ) -> tuple[Resolution, PassiveQpMemory]:
-        qdot = np.minimum(np.maximum(x[:7], problem.lower), problem.upper)
-        dt, J = problem.dt_s, problem.kin.Jv_WT
-        v_T = J @ qdot
-        command = TipCommand(
-            p_WTd=memory.p_Td,
-            v_WTd=v_T,
-            a_WTd=(v_T - memory.v_T) / dt,
-            roll_rate=problem.command.roll_rate,
-            jaw=problem.command.jaw,
+        kin, told = problem.kin, problem.command
+        qdot, v_T, a_T, p_Td, residual, values = _finish(
+            x,
+            problem.lower,
+            problem.upper,
+            kin.Jv_WT,
+            kin.p_WT,
+            memory.v_T,
+            memory.p_Td,
+            problem.dt_s,
+            self._c.lead_max_m,
+            program.G,
+            program.G_upper,
+            len(self._planes),
+            relaxed,
         )
-        lead = memory.p_Td - problem.kin.p_WT
-        length = max(math.sqrt(float(lead @ lead)), self._c.lead_max_m)
-        p_Td = problem.kin.p_WT + lead * (self._c.lead_max_m / length) + dt * v_T
-        resolution = Resolution(
-            qdot=qdot,
-            residual=math.sqrt(float(x[7:10] @ x[7:10])),
-            command=command,
-            values=np.concatenate((x[7:], self._active(program, x), [relaxed])),
-        )
+        command = TipCommand(p_WTd=memory.p_Td, v_WTd=v_T, a_WTd=a_T, roll_rate=told.roll_rate, jaw=told.jaw)
+        resolution = Resolution(qdot=qdot, residual=residual, command=command, values=values)
         return resolution, PassiveQpMemory(qdot=qdot, v_T=v_T, p_Td=p_Td)
 
-    def _active(self, p: _Program, x: Array) -> Array:
-        """Whether the passivity row is at its bound, and how many walls are (2,)."""
-        walls = len(self._planes)
-        rows = slice(len(p.G) - 3 - walls - 1, len(p.G) - 3)
-        at = p.G[rows] @ x >= p.G_upper[rows] - _ACTIVE
-        return np.array([float(at[0]), float(at[1:].sum())])
+
+@compiled
+def _finish(
+    x: Array,
+    lower: Array,
+    upper: Array,
+    J: Array,
+    p: Array,
+    v_last: Array,
+    p_Td: Array,
+    dt: float,
+    lead_max: float,
+    G: Array,
+    G_upper: Array,
+    walls: int,
+    relaxed: float,
+) -> tuple[Array, Array, Array, Array, float, Array]:
+    """Joint and tip velocity, tip acceleration, next tip reference, residual, values of the columns (7,).
+
+    The row of the energy budget and those of the walls are active where they are at their bound.
+    """
+    qdot = np.minimum(np.maximum(x[:7], lower), upper)
+    v_T = J @ qdot
+    lead = p_Td - p
+    length = max(math.sqrt(lead @ lead), lead_max)
+    values = np.zeros(7)
+    values[:4] = x[7:]
+    budget = G.shape[0] - 4 - walls
+    for i in range(budget, budget + 1 + walls):
+        at = 0.0
+        for j in range(11):
+            at += G[i, j] * x[j]
+        if at >= G_upper[i] - _ACTIVE:
+            values[4 if i == budget else 5] += 1.0
+    values[6] = relaxed
+    residual = math.sqrt(x[7] * x[7] + x[8] * x[8] + x[9] * x[9])
+    return qdot, v_T, (v_T - v_last) / dt, p + lead * (lead_max / length) + dt * v_T, residual, values
 
 
 @compiled
