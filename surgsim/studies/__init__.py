@@ -7,6 +7,7 @@ from surgsim.studies.study import RunStudy
 
 STUDIES: dict[str, str] = {
     "manipulability_validation": "surgsim.studies.manipulability_validation",
+    "passive_teleoperation": "surgsim.studies.passive_teleoperation",
     "vprnn": "surgsim.studies.vprnn",
 }
 """Name of each study, and the module that is imported when it is run."""

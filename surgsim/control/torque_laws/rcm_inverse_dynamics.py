@@ -35,7 +35,7 @@ class RcmInverseDynamicsConfig(PartConfig):
             in; 0 switches it off.
         most_delay_ticks: Longest actuation delay that is recognised and predicted over; 0 switches the
             prediction off.
-        full_gain_delay_s: Longest recognised delay at which all gains are whole; past it the bandwidths fall as
+        full_gain_delay_s: Longest recognised delay at which all gains are whole; past it bandwidths fall as
             its inverse [s].
         contact: What becomes of the measured force on the tip: `reject` lets the observer cancel it like
             any disturbance; `yield` cancels it too, but for the tip's acceleration along it, so that the tip is an
