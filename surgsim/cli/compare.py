@@ -7,6 +7,7 @@ import shlex
 import sys
 from contextlib import redirect_stdout
 from pathlib import Path
+from typing import Any
 
 from surgsim.cli.paths import path_argument
 
@@ -136,14 +137,16 @@ def _runner(options: argparse.Namespace):  # type: ignore[no-untyped-def]
     return ray_runner(options.address)
 
 
-def _print(table: object, options: argparse.Namespace) -> None:
+def _print(table: Any, options: argparse.Namespace) -> None:
     import json
 
     from surgsim.cli.output import print_leaderboard
     from surgsim.compare.leaderboard import leaderboard
+    from surgsim.compare.observations import Observations
 
-    rows = leaderboard(table, options.metric)
+    runs = Observations.of(table)
+    rows = leaderboard(runs, options.metric)
     if options.json:
         print(json.dumps(rows, indent=2, default=vars))
     else:
-        print_leaderboard(options.metric, rows)
+        print_leaderboard(options.metric, rows, len(set(runs.parameters.tolist())))

@@ -171,8 +171,8 @@ class _BatchLines:
             print(text, file=sys.stderr, flush=True)
 
 
-def print_leaderboard(metric: str, rows: "Sequence[LeaderboardRow]") -> None:
-    """Print a leaderboard, failures beside every figure."""
+def print_leaderboard(metric: str, rows: "Sequence[LeaderboardRow]", points: int) -> None:
+    """Print a leaderboard, failures beside every figure, and over how many points of a grid it pools them."""
 
     def interval(figure: "Interval") -> str:
         if figure.value is None:
@@ -189,4 +189,5 @@ def print_leaderboard(metric: str, rows: "Sequence[LeaderboardRow]") -> None:
         for row in rows
     ]
     header = ("controller", "runs", "failed", f"{metric} (IQM, 95 %)", "mean rank (95 %)")
-    print_table(f"{metric}, best mean rank first", header, table, right=(1, 3, 4))
+    pooled = f", all {points} points of the grid pooled" if points > 1 else ""
+    print_table(f"{metric}, best mean rank first{pooled}", header, table, right=(1, 3, 4))

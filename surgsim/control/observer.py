@@ -144,7 +144,7 @@ class DelayEstimate:
         """Compare the torque of the last period with what was commanded 1, 2, ... ticks ago."""
         scores, ticks = _score(self.commands, self.scores, tau_measured)
         offset, expected = self.offset, self.commands[ticks]
-        if np.isfinite(expected[0]):
+        if np.isfinite(self.commands[-1, 0]):  # before, a delay may not have shown
             offset = offset + dt_s / OFFSET_MEMORY_S * (tau_measured - expected - offset)
         return replace(self, scores=scores, ticks=ticks, offset=offset)
 

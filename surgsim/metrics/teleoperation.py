@@ -124,6 +124,11 @@ def task_time(trace: Trace) -> float:
     return float(trace["t_s"][done[0]]) if done.size else math.nan
 
 
+def _answered(values: Array) -> Array:
+    """`values` (rows,) of the ticks in which the controller had an answer."""
+    return values[np.isfinite(values)]
+
+
 METRICS = (
     Metric(
         name="velocity_error_rms_mm_per_s",
@@ -170,19 +175,21 @@ METRICS = (
     Metric(
         name="slack_rms_mm_per_s",
         meaning="RMS of the tip velocity that the controller gave up",
-        compute=_of("slack", lambda trace: 1e3 * rms(np.linalg.norm(trace.block("slack"), axis=1))),
+        compute=_of(
+            "slack", lambda trace: 1e3 * rms(_answered(np.linalg.norm(trace.block("slack"), axis=1)))
+        ),
         lower_is_better=None,
     ),
     Metric(
         name="passivity_active_fraction",
         meaning="fraction of ticks in which the energy budget limits the tip",
-        compute=_of("passivity_active", lambda trace: float(np.mean(trace["passivity_active"]))),
+        compute=_of("passivity_active", lambda trace: float(np.mean(_answered(trace["passivity_active"])))),
         lower_is_better=None,
     ),
     Metric(
         name="relaxed_ticks",
         meaning="ticks in which the acceleration bounds gave way to hard rows",
-        compute=_of("qp_relaxed", lambda trace: float(np.sum(trace["qp_relaxed"]))),
+        compute=_of("qp_relaxed", lambda trace: float(np.sum(_answered(trace["qp_relaxed"])))),
     ),
     Metric(
         name="goals_missed",

@@ -94,7 +94,7 @@ class DynamicPlant:
         return (*wall, *tip, *self._bystanders.columns, *energies, *self._parts.columns)
 
     def reset(self, q: Array) -> State:
-        """Put the arm at rest at joint positions `q` (7,) [rad]."""
+        """Put the arm at rest at joint positions `q` (7,) [rad], held until now by the torques that it needs."""
         mujoco.mj_resetData(self._model, self._data)
         self._qpos[:] = q
         self._tick = 0
@@ -104,6 +104,7 @@ class DynamicPlant:
         self._port.reset()
         self._clear_forces(0.0)
         mujoco.mj_step1(self._model, self._data)
+        self._tau = arm_view(self._data.qfrc_bias, self._scene.dof_ids).copy()
         if self._ledger is not None:
             self._ledger.start()
         return self._state()

@@ -163,6 +163,7 @@ class Simulation:
 
     def _brake(self, row: Array) -> None:
         """One period of the stop's motion, in the controller's place."""
+        self._setup.controller.reset()  # what it remembers is not what the arm did
         motion = self._stop.tick(self._state)
         row[self._rows.at["qdot_ref"]] = motion.qdot
         row[self._rows.at["q_ref"]] = motion.q

@@ -130,10 +130,10 @@ class Failing:
 
     def __init__(self, inner, ticks):
         self.inner, self.terms, self.columns, self.ticks = inner, inner.terms, inner.columns, ticks
+        self.count = -1
 
     def reset(self):
         self.inner.reset()
-        self.count = -1
 
     def tick(self, state, command):
         self.count += 1
@@ -156,6 +156,19 @@ def test_up_to_n_ticks_in_a_row_without_an_answer_are_bridged_by_braking(scenari
     assert np.flatnonzero(trace["infeasible"]).tolist() == [100, 101, 102, 150]
     before, during = (np.linalg.norm(trace.block("qdot_ref")[k]) for k in (99, 102))
     assert during < before
+
+
+def test_the_controller_takes_over_from_the_brake_without_a_kick(scenario):
+    """What it remembered from before the bridge would look like a sudden push."""
+    changes = ("safety.infeasible_ticks_max=50", "task.hold_start_s=0.2", "disturbances=[{type: payload}]")
+    setup = prepare(scenario(*changes, controller="rcm_inverse_dynamics"))
+    traces = [
+        Simulation(replace(setup, controller=Failing(setup.controller, ticks))).run()
+        for ticks in (set(), set(range(150, 160)))
+    ]
+    calm, bridged = (np.abs(np.diff(trace.block("tau"), axis=0)).max(axis=1) for trace in traces)
+    assert bridged[160:].max() < 3.0 * calm[150:].max()
+    assert traces[1].meta.ending.outcome is Outcome.COMPLETED
 
 
 def test_one_more_ends_the_run_as_infeasible(scenario):

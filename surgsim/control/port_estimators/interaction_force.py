@@ -25,7 +25,8 @@ class InteractionForceConfig(PartConfig):
     Attributes:
         compliance_m_per_n_s: Gain: speed of the estimate per newton [m/(N s)].
         observer_gain: Share of a period's unexplained velocity change that the force estimate takes in.
-        tare_s: The mean force over this first time is what payload and friction do, and is taken off [s].
+        tare_s: The mean force over this first time is what payload and friction do, and is taken off; so
+            long the shaft must hang free in the port, as a wall that presses on it is taken off too [s].
         threshold_n: Forces below this are taken for noise [N].
         rate_hz: Breathing rate, as the ventilator's is known; null: not used [Hz].
         harmonics: How many multiples of it are learnt.
@@ -117,13 +118,14 @@ class InteractionForce:
             push = np.zeros(3)
         else:
             push = _beyond(force - tare, self._c.threshold_n)
-        offset = _within(offset + problem.dt_s * self._c.compliance_m_per_n_s * push, self._c.most_m)
+        last = offset
+        offset = _within(last + problem.dt_s * self._c.compliance_m_per_n_s * push, self._c.most_m)
         waves = waves + problem.dt_s * self._c.harmonic_gain_m_per_n_s * np.outer(learnt, push)
         rate = np.concatenate((-self._omega * np.sin(phase), self._omega * np.cos(phase)))
         curve = np.concatenate((self._omega, self._omega)) ** 2 * -swing
         estimate = PortEstimate(
             p_WC=problem.p_WC + offset + swing @ waves,
-            v_WC=problem.v_WC + self._c.compliance_m_per_n_s * push + rate @ waves,
+            v_WC=problem.v_WC + (offset - last) / problem.dt_s + rate @ waves,
             a_WC=curve @ waves,
         )
         return estimate, InteractionForceMemory(

@@ -37,9 +37,11 @@ class RcmInverseDynamicsConfig(PartConfig):
             prediction off.
         full_gain_delay_s: Longest recognised delay at which all gains are whole; past it bandwidths fall as
             its inverse [s].
+        sensor_delay_s: Part of the recognised delay that is known to be the sensors': the command, which is
+            of now, is not carried over it [s].
         contact: What becomes of the measured force on the tip: `reject` lets the observer cancel it like
-            any disturbance; `yield` cancels it too, but for the tip's acceleration along it, so that the tip is an
-            impedance towards what it touches.
+            any disturbance; `yield` cancels it too, but for the tip's acceleration along it, so that the tip
+            is an impedance towards what it touches.
     """
 
     type: Literal["rcm_inverse_dynamics"] = "rcm_inverse_dynamics"
@@ -52,6 +54,7 @@ class RcmInverseDynamicsConfig(PartConfig):
     observer_gain: Annotated[float, Field(ge=0.0, le=1.0)] = 0.3
     most_delay_ticks: NonNegativeInt = 20
     full_gain_delay_s: PositiveFloat = 0.01
+    sensor_delay_s: NonNegativeFloat = 0.0
     contact: Literal["reject", "yield"] = "reject"
 
     def build(self, arm: ArmModel) -> "RcmInverseDynamics":
@@ -163,8 +166,9 @@ class RcmInverseDynamics:
         """Terms of the torque for the state (q, v) that is reached `late_s` from now."""
         k, command = self._gains * share**_ORDERS, p.command
         linear, angular = velocity_product_accelerations(kin, v)
-        p_d = command.p_WTd + late_s * (command.v_WTd + 0.5 * late_s * command.a_WTd)
-        v_d = command.v_WTd + late_s * command.a_WTd
+        ahead_s = max(late_s - self._c.sensor_delay_s, 0.0)
+        p_d = command.p_WTd + ahead_s * (command.v_WTd + 0.5 * ahead_s * command.a_WTd)
+        v_d = command.v_WTd + ahead_s * command.a_WTd
         a_tip = command.a_WTd - linear + k[3] * (v_d - kin.Jv_WT @ v) + k[2] * (p_d - kin.p_WT)
         J, a = kin.Jv_WT, a_tip
         if p.rcm is not None:
@@ -178,7 +182,7 @@ class RcmInverseDynamics:
         if self._c.contact == "yield" and p.f_T.any():
             a[:3] += _giving_way(dyn.mass_matrix, J, p.f_T)
         qdot_ref = p.resolution.qdot
-        posture = k[4] * (p.q_ref + late_s * qdot_ref - q) + k[5] * (qdot_ref - v)
+        posture = k[4] * (p.q_ref + ahead_s * qdot_ref - q) + k[5] * (qdot_ref - v)
         constant = dyn.bias + self._damping * v - d
         terms, qddot = _inverse_dynamics(dyn.mass_matrix, J, a, posture)
         terms[3] = dyn.bias + self._damping * v

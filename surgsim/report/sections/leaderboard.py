@@ -47,6 +47,9 @@ def leaderboard_section(results: Results, boards: Boards) -> str:
         "Bold: the best of the controllers that never failed. Mean rank: by "
         f"{main}, over scenarios, failures last."
     )
+    points = len(set(results.runs.parameters.tolist()))
+    if points > 1:
+        note += f" All {points} points of the grid are pooled here; the sections below tell them apart."
     board = html.table("Leaderboard", _head(results, main), rows, "board")
     return html.section("leaderboard", "Leaderboard", html.paragraph(note), board, _PRINTED, _LIVE)
 

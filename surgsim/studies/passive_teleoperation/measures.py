@@ -97,7 +97,8 @@ def _free_slack(trace: Trace, slack: Array, limited: NDArray[np.bool_]) -> float
 
 
 def push_row(case: Push, trace: Trace) -> Row:
-    """A push: energy, how it ends, tracking and force feel."""
+    """A push: energy, how it ends, tracking and force feel; a stopped one until its stop."""
+    trace = trace.active()
     speed = 1e3 * magnitude(trace, "handle_velocity")
     force, felt = magnitude(trace, "tip_force"), magnitude(trace, "master_force")
     t, end_s = trace["t_s"], case.duration_s
