@@ -7,7 +7,7 @@ from typing import Literal, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from surgsim.teleop.live.intent import Intent
+from surgsim.teleop.manual.intent import Intent
 
 Array = NDArray[np.float64]
 Action = Literal["jaw", "faster", "slower", "end"]

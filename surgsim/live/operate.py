@@ -15,9 +15,9 @@ from surgsim.runs.folder import RunResult, check_target, write_run
 from surgsim.scenario.schema import Scenario
 from surgsim.simulate.loop import Progress, Simulation
 from surgsim.simulate.setup import Setup, prepare
-from surgsim.teleop.live.hand import LiveHand
-from surgsim.teleop.live.intent import Source
-from surgsim.teleop.live.tape import Recorder, source_of
+from surgsim.teleop.manual.hand import LiveHand
+from surgsim.teleop.manual.intent import Source
+from surgsim.teleop.manual.tape import Recorder, source_of
 from surgsim.trace.trace import Trace
 
 DEVICES = ("keyboard", "gamepad")

@@ -75,7 +75,7 @@ class DynamicPlant:
         self._port = Port(scene, self._data)
         self._ledger = EnergyLedger(scene, self._data, self._port) if energy_ledger else None
         self._bystanders = Bystanders(scene, self._data)
-        self._has_wall = mujoco.mj_name2id(scene.model, mujoco.mjtObj.mjOBJ_BODY, "cannula") >= 0
+        self._has_wall = scene.wall is not None
         self._disturbed = bool(parts) or self._has_wall
         self._points = PointReader(scene, self._data)
         self._contacts = ContactWatch(scene, self._data)
@@ -94,7 +94,7 @@ class DynamicPlant:
         return (*wall, *tip, *self._bystanders.columns, *energies, *self._parts.columns)
 
     def reset(self, q: Array) -> State:
-        """Put the arm at rest at joint positions `q` (7,) [rad], held until now by the torques that it needs."""
+        """Put the arm at rest at joint positions `q` (7,) [rad], held so far by the torques that it needs."""
         mujoco.mj_resetData(self._model, self._data)
         self._qpos[:] = q
         self._tick = 0

@@ -7,9 +7,9 @@ from hypothesis import strategies as st
 
 from surgsim.errors import SurgsimError
 from surgsim.teleop.console import Console, ConsoleConfig
-from surgsim.teleop.live.hand import LEAD_M, LiveHand
-from surgsim.teleop.live.intent import Intent
-from surgsim.teleop.live.tape import HEADER, Player, Recorder, read_tape
+from surgsim.teleop.manual.hand import LEAD_M, LiveHand
+from surgsim.teleop.manual.intent import Intent
+from surgsim.teleop.manual.tape import HEADER, Player, Recorder, read_tape
 from surgsim.teleop.mapping import MappingConfig, rotation_matrix
 from surgsim.teleop.operator import OperatorConfig
 

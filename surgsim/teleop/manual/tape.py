@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from surgsim.errors import SurgsimError
-from surgsim.teleop.live.intent import Intent, Source
+from surgsim.teleop.manual.intent import Intent, Source
 
 HEADER = ("t_s", "velocity_x_m_per_s", "velocity_y_m_per_s", "velocity_z_m_per_s", "jaw", "end")
 _FASTEST_M_PER_S = 10.0

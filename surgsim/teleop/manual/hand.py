@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from surgsim.teleop.console import ConsoleState
 from surgsim.teleop.impedance import hand_wrench
-from surgsim.teleop.live.intent import Intent, Source
+from surgsim.teleop.manual.intent import Intent, Source
 from surgsim.teleop.mapping import MappingConfig, rotation_matrix
 from surgsim.teleop.operator import HandCommand, OperatorConfig
 
