@@ -17,7 +17,9 @@ KINDS = (
     "tasks",
     "resolvers",
     "torque-laws",
+    "port-estimators",
     "disturbances",
+    "props",
     "metrics",
 )
 
@@ -51,16 +53,20 @@ def _items(kind: str) -> list[tuple[str, str]]:
         from surgsim.metrics.catalog import METRICS
 
         return [(metric.name, metric.meaning) for metric in METRICS.values()]
+    from surgsim.control.port_estimators import PORT_ESTIMATORS
     from surgsim.control.resolvers import RESOLVERS
     from surgsim.control.torque_laws import TORQUE_LAWS
     from surgsim.plant.disturbances import DISTURBANCES
+    from surgsim.plant.props import PROPS
     from surgsim.tasks import TASKS
 
     catalogs = {
         "tasks": TASKS,
         "resolvers": RESOLVERS,
         "torque-laws": TORQUE_LAWS,
+        "port-estimators": PORT_ESTIMATORS,
         "disturbances": DISTURBANCES,
+        "props": PROPS,
     }
     catalog = catalogs[kind]
     return [(name, catalog.summary(name)) for name in catalog.names()]
