@@ -21,6 +21,7 @@ FREE_SLACK_M_PER_S = 1e-4
 FREE_FORCE_N = 0.1
 _CONSTRAINTS = ("passivity_active", "planes_active", "qp_relaxed")
 _ALONE = ("ring_state", "trocar_force")
+_PUSHING = {"push", "guiding_hand"}
 
 
 def _teleoperated(compute: Callable[[Trace], float]) -> Callable[[Trace], float]:
@@ -75,19 +76,28 @@ def energy_residual(trace: Trace) -> Array:
         tanks and channels   change of T_o + T_r, + in flight + lost + overflow - deficit + W_handle + W_tip
         console              kinetic + potential - motors - hand + damping + friction
         arm                  kinetic + potential + springs - actuators - applied - contact + losses
-        tip                  W_tip as booked by the tank + the contact's work on the arm as the plant has it
+        tip                  W_tip as booked by the tank + the touch's work on the arm as the plant has it
 
-    The last one where nothing but the tip has contact. Rows of a trace without a ledger are NaN.
+    The last one where nothing but the tip is touched. Rows of a trace without a ledger are NaN.
     """
     if "energy_residual" not in trace:
         return np.full(len(trace), np.nan)
     total = np.abs(trace["console_residual_j"]) + np.abs(trace["energy_residual_j"])
     if np.isfinite(trace["tank_account_residual_j"]).all():
         total += np.abs(trace["tank_account_residual_j"])
-    if not any(name in trace for name in _ALONE):
-        contact = trace["energy_contact_work_j"]  # one row late: of the instant at which the last step began
-        total[:-1] += np.abs(trace["environment_work_j"][:-1] + contact[1:])
+    touch = _work_of_touch(trace)
+    if touch is not None:  # one row late: of the instant at which the last step began
+        total[:-1] += np.abs(trace["environment_work_j"][:-1] + touch[1:])
     return total
+
+
+def _work_of_touch(trace: Trace) -> Array | None:
+    """Work of what the tip touches on the arm, by the plant's ledger (rows,) [J]; None if more is in it."""
+    acting = {disturbance["type"] for disturbance in trace.meta.scenario.get("disturbances", ())}
+    if any(name in trace for name in _ALONE) or ("tissue" in acting and acting & _PUSHING):
+        return None
+    touch = trace["energy_contact_work_j"]
+    return touch + trace["energy_applied_work_j"] if "tissue" in acting else touch
 
 
 def energy_exchanged(trace: Trace) -> float:

@@ -7,6 +7,7 @@ import pytest
 from pydantic import ValidationError
 
 from surgsim.errors import Outcome, SurgsimError
+from surgsim.metrics.catalog import compute_metrics
 from surgsim.models.peg_board import PegBoardLayout, transfer_goals
 from surgsim.scenario.load import load_scenario
 from surgsim.simulate.loop import simulate
@@ -186,3 +187,16 @@ def test_equal_runs_are_equal():
     first, again = (simulate(scenario) for _ in range(2))
     for name in ("tip_x_m", "handle_x_m", "lost_packets", "tank_operator_j"):
         np.testing.assert_array_equal(first[name], again[name])
+
+
+def test_an_emptied_tank_holds_the_tip_back_in_tissue_and_the_ledger_still_closes():
+    trace = simulate(
+        load_scenario("teleop_tissue_panda", assignments=["theatre=false", "task.duration_s=4.0"])
+    )
+    metrics = compute_metrics(trace)
+    assert metrics["passivity_active_fraction"] > 0.01
+    assert metrics["slack_rms_mm_per_s"] > 1.0
+    assert metrics["tank_min_j"] > 0.0
+    assert metrics["rcm_error_max_mm"] <= 0.1
+    assert metrics["energy_residual_fraction"] <= 0.01
+    assert metrics["infeasible_ticks"] == 0
