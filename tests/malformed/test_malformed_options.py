@@ -99,7 +99,10 @@ OPTIONS = {
     "inspect a b c": "inspect takes one recording, two, or a batch's folder",
     "inspect . --run x": "holds no runs.parquet",
     "inspect scenario.yaml": "scenario.yaml: is not a rerun recording",
-    "reproduce vprn": "'vprn' is not a study. Known: manipulability_validation, passive_teleoperation, vprnn. Did you mean 'vprnn'?",
+    "reproduce vprn": (
+        "'vprn' is not a study. Known: manipulability_validation, passive_teleoperation, vprnn. "
+        "Did you mean 'vprnn'?"
+    ),
     f"reproduce {LONG}": "is not a study",
     "reproduce vprnn --out scenario.yaml": "scenario.yaml is a file; --out names a folder",
     "reproduce vprnn --out .": "which is not a study's; choose another --out",
