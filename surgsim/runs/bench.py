@@ -13,6 +13,8 @@ from surgsim.simulate.loop import Simulation
 from surgsim.simulate.setup import prepare
 
 _SCENARIO = "circle_lwr4plus"
+_NEEDS = {"rcm_interaction_force": ("trocar.wall={}",)}
+"""What a controller needs in the scenario to be run at all."""
 
 
 def bench(duration_s: float, repeat: int) -> list[dict[str, Any]]:
@@ -35,6 +37,7 @@ def _once(controller: str, duration_s: float) -> dict[str, Any]:
         "task.ramp_s=0.5",
         "task.hold_start_s=0",
         "task.hold_end_s=0",
+        *_NEEDS.get(controller, ()),
     ]
     scenario = load_scenario(_SCENARIO, controller=controller, assignments=settings)
     setup = prepare(scenario)
