@@ -82,6 +82,7 @@ class DynamicPlant:
         self._tick = 0
         self._tau = np.zeros(7)
         self._f_T = NO_FORCE
+        self._adds_columns = bool(self.columns)
         self._truth = self._look()
 
     @property
@@ -164,13 +165,6 @@ class DynamicPlant:
         p_WT, p_WR, p_WC = self._points.read()
         f_C = self._port.force() if self._has_wall else NOWHERE
         touched = self._parts.touch_tip
-        columns = (
-            f_C if self._has_wall else NO_VALUES,
-            self._f_T if touched else NO_VALUES,
-            self._bystanders.values(),
-            self._ledger_terms(),
-            self._parts.values(),
-        )
         return Truth(
             q=self._qpos.copy(),
             v=self._qvel.copy(),
@@ -180,11 +174,20 @@ class DynamicPlant:
             f_C=f_C,
             f_T=self._f_T if touched else NOWHERE,
             contact=self._contacts.look(p_WC),
-            values=np.concatenate(columns),
+            values=self._values(f_C) if self._adds_columns else NO_VALUES,
         )
 
-    def _ledger_terms(self) -> Array:
-        return np.zeros(0) if self._ledger is None else self._ledger.terms()
+    def _values(self, f_C: Array) -> Array:
+        """Values of `columns` now."""
+        return np.concatenate(
+            (
+                f_C if self._has_wall else NO_VALUES,
+                self._f_T if self._parts.touch_tip else NO_VALUES,
+                self._bystanders.values(),
+                NO_VALUES if self._ledger is None else self._ledger.terms(),
+                self._parts.values(),
+            )
+        )
 
     def _state(self) -> State:
         truth = self._truth = self._look()
