@@ -1,5 +1,6 @@
 """What a metric is."""
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -25,3 +26,12 @@ class Metric:
     lower_is_better: bool | None = True
     whole: bool = False
     digits: int = 4
+
+
+def with_block(block: str, compute: Callable[[Trace], float], rows: int = 1) -> Callable[[Trace], float]:
+    """`compute`, for traces with that block and so many rows; NaN for the others."""
+
+    def value(trace: Trace) -> float:
+        return compute(trace) if block in trace and len(trace) >= rows else math.nan
+
+    return value

@@ -9,7 +9,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from surgsim.metrics.metric import Metric
+from surgsim.metrics.metric import Metric, with_block
 from surgsim.trace.trace import Trace
 
 GRASPED, ON_TARGET = 1.0, 2.0
@@ -18,11 +18,7 @@ GRASPED, ON_TARGET = 1.0, 2.0
 
 def _of_board(compute: Callable[[Trace], float]) -> Callable[[Trace], float]:
     """`compute`, for traces with a peg board."""
-
-    def value(trace: Trace) -> float:
-        return compute(trace) if "ring_state" in trace and len(trace) else math.nan
-
-    return value
+    return with_block("ring_state", compute)
 
 
 def _at_end(trace: Trace) -> NDArray[np.bool_]:

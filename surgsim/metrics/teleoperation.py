@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from surgsim.metrics.accuracy import rms
 from surgsim.metrics.force import largest
-from surgsim.metrics.metric import Metric
+from surgsim.metrics.metric import Metric, with_block
 from surgsim.trace.trace import Trace
 
 Array = NDArray[np.float64]
@@ -26,16 +26,12 @@ _PUSHING = {"push", "guiding_hand"}
 
 def _teleoperated(compute: Callable[[Trace], float]) -> Callable[[Trace], float]:
     """`compute`, for traces of a teleoperation."""
-
-    def value(trace: Trace) -> float:
-        return compute(trace) if "velocity_command" in trace and len(trace) > 1 else math.nan
-
-    return value
+    return with_block("velocity_command", compute, rows=2)
 
 
 def _of(block: str, compute: Callable[[Trace], float]) -> Callable[[Trace], float]:
     """`compute`, for teleoperations whose trace has `block`."""
-    return _teleoperated(lambda trace: compute(trace) if block in trace else math.nan)
+    return _teleoperated(with_block(block, compute))
 
 
 def free_ticks(trace: Trace) -> Mask:
