@@ -54,6 +54,35 @@ class RunStudy(Protocol):
         ...
 
 
+def write_study(
+    out: Path,
+    tables: Mapping[str, Sequence[Row]],
+    claims: tuple[Claim, ...],
+    draw: Callable[[], tuple[str, ...]] | None,
+    report: Callable[[Path, tuple[str, ...]], None],
+    progress: Progress,
+) -> StudyResult:
+    """Write a study's tables, figures and README.md into the existing folder `out`.
+
+    Args:
+        out: The folder.
+        tables: Name of each table to its rows, the main one first.
+        claims: Every claim that was checked.
+        draw: Draws the figures and names their files; None draws nothing.
+        report: Writes the page at a path, given the figures' files.
+        progress: Told of what takes time.
+    """
+    for name, rows in tables.items():
+        write_csv(out / f"{name}.csv", rows)
+    figures: tuple[str, ...] = ()
+    if draw is not None:
+        progress("figures")
+        figures = draw()
+    report(out / "README.md", figures)
+    files = ("README.md", *(f"{name}.csv" for name in tables), *figures)
+    return StudyResult(claims=claims, tables=tables, files=files)
+
+
 def format_cell(value: Cell, digits: int = 4, column: str = "") -> str:
     """A cell as text: `digits` significant digits, two decimals for percents, a dash for None."""
     if value is None:

@@ -25,7 +25,7 @@ from surgsim.studies.manipulability_validation.tables import (
     table_5,
     variants,
 )
-from surgsim.studies.study import Progress, Row, StudyResult, write_csv
+from surgsim.studies.study import Progress, Row, StudyResult, write_study
 
 QUICK_SAMPLE = (("circle", 3), ("sinusoid", 4))
 
@@ -39,17 +39,16 @@ def run(out: Path, quick: bool, progress: Progress) -> StudyResult:
     data = collect(sample, quick, progress)
     tables = tables_of(data, quick)
     claims = claims_of(tables)
-    for name, rows in tables.items():
-        write_csv(out / f"{name}.csv", rows)
-    figures: tuple[str, ...] = ()
-    if not quick:
+
+    def draw_all() -> tuple[str, ...]:
         from surgsim.studies.manipulability_validation.figures import draw
 
-        progress("figures")
-        figures = draw(data, out)
-    write_report(out / "README.md", tables, claims, figures, quick=quick)
-    files = ("README.md", *(f"{name}.csv" for name in tables), *figures)
-    return StudyResult(claims=claims, tables=tables, files=files)
+        return draw(data, out)
+
+    def report(page: Path, figures: tuple[str, ...]) -> None:
+        write_report(page, tables, claims, figures, quick=quick)
+
+    return write_study(out, tables, claims, None if quick else draw_all, report, progress)
 
 
 def collect(sample: Sample, quick: bool, progress: Progress) -> Data:

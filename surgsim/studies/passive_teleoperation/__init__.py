@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 from surgsim.studies.passive_teleoperation.cases import (
@@ -20,7 +21,7 @@ from surgsim.studies.passive_teleoperation.paper import beside_the_paper
 from surgsim.studies.passive_teleoperation.report import write_report
 from surgsim.studies.passive_teleoperation.runs import Done, run_cases
 from surgsim.studies.passive_teleoperation.timing import timing_row
-from surgsim.studies.study import Progress, Row, StudyResult, write_csv
+from surgsim.studies.study import Progress, Row, StudyResult, write_study
 from surgsim.studies.vprnn.cells import pick
 
 WORKERS = 2
@@ -80,15 +81,12 @@ def run(out: Path, quick: bool, progress: Progress) -> StudyResult:
     """Run the study and write its tables, figures and README.md into the existing folder `out`."""
     data = collect(QUICK if quick else FULL, progress)
     claims = (*paper_claims(data.tables), *own_claims(data.tables))
-    for name, rows in data.tables.items():
-        write_csv(out / f"{name}.csv", rows)
-    figures: tuple[str, ...] = ()
-    if not quick:
-        progress("figures")
-        figures = _draw(data, out)
-    write_report(out / "README.md", data.tables, claims, figures, quick=quick)
-    files = ("README.md", *(f"{name}.csv" for name in data.tables), *figures)
-    return StudyResult(claims=claims, tables=data.tables, files=files)
+    draw = None if quick else partial(_draw, data, out)
+
+    def report(page: Path, figures: tuple[str, ...]) -> None:
+        write_report(page, data.tables, claims, figures, quick=quick)
+
+    return write_study(out, data.tables, claims, draw, report, progress)
 
 
 def collect(extent: Extent, progress: Progress) -> Data:

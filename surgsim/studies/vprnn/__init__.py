@@ -2,9 +2,10 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
-from surgsim.studies.study import Progress, Row, StudyResult, write_csv
+from surgsim.studies.study import Progress, Row, StudyResult, write_study
 from surgsim.studies.vprnn.cases import METHODS, NOMINAL, PAPER_SIZE, Level
 from surgsim.studies.vprnn.claims import paper_claims
 from surgsim.studies.vprnn.comparison import VARIANTS, Runs, Variant, comparison_table, run_all, variant_table
@@ -91,17 +92,12 @@ def run(out: Path, quick: bool, progress: Progress) -> StudyResult:
     """Run the study and write its tables, figures and README.md into the existing folder `out`."""
     data = collect(QUICK if quick else FULL, progress)
     claims = (*paper_claims(data.tables), *own_claims(data.tables))
-    for name, rows in data.tables.items():
-        write_csv(out / f"{name}.csv", rows)
-    figures: tuple[str, ...] = ()
-    if not quick:
-        progress("figures")
-        figures = _draw(data, out)
-    write_report(
-        out / "README.md", data.tables, claims, figures, cross_rank=cross_form_rank(data.at), quick=quick
-    )
-    files = ("README.md", *(f"{name}.csv" for name in data.tables), *figures)
-    return StudyResult(claims=claims, tables=data.tables, files=files)
+    draw = None if quick else partial(_draw, data, out)
+
+    def report(page: Path, figures: tuple[str, ...]) -> None:
+        write_report(page, data.tables, claims, figures, cross_rank=cross_form_rank(data.at), quick=quick)
+
+    return write_study(out, data.tables, claims, draw, report, progress)
 
 
 def collect(extent: Extent, progress: Progress) -> Data:
