@@ -1,5 +1,6 @@
 """Named columns: what a part of the simulation adds to the record of a run."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 JOINTS = tuple(str(i + 1) for i in range(7))
@@ -41,3 +42,8 @@ def vector(name: str, unit: str) -> Block:
 def scalar(name: str, unit: str = "") -> Block:
     """Block of one column."""
     return Block(name, ("",), unit)
+
+
+def width(blocks: Iterable[Block]) -> int:
+    """Number of columns of some blocks."""
+    return sum(len(block.columns) for block in blocks)

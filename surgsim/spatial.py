@@ -5,6 +5,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from surgsim.compiled import compiled
+
 Array = NDArray[np.float64]
 
 
@@ -44,9 +46,10 @@ def plane_axes(normal: Array, direction: Array) -> tuple[Array, Array, Array]:
     return x, cross(z, x), z
 
 
+@compiled
 def shaft_distance(p_C: Array, p_T: Array, p_R: Array) -> float:
     """Distance of point `p_C` from the line through `p_R` and `p_T` [m]: the RCM error."""
-    ax, ay, az = (p_T - p_R).tolist()
-    bx, by, bz = (p_C - p_T).tolist()
+    ax, ay, az = p_T[0] - p_R[0], p_T[1] - p_R[1], p_T[2] - p_R[2]
+    bx, by, bz = p_C[0] - p_T[0], p_C[1] - p_T[1], p_C[2] - p_T[2]
     cx, cy, cz = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
     return math.sqrt((cx * cx + cy * cy + cz * cz) / (ax * ax + ay * ay + az * az))

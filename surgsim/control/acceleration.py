@@ -4,63 +4,66 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surgsim.compiled import compiled
-from surgsim.control.problem import BRAKING_SHARE, ControlFailure, stopping_speed
-from surgsim.control.qp import DenseQp
-from surgsim.errors import Outcome
-from surgsim.models.build import JointLimits
+from surgsim.control.bounds import BRAKING_SHARE, stopping_speed
+from surgsim.tick.algebra import times
+from surgsim.tick.arrays import Seen
+from surgsim.tick.quadratic_program import SOLVED, solve
+from surgsim.tick.status import GOES_ON, INFEASIBLE
 
 Array = NDArray[np.float64]
 
-_SPEED_SHARE = 0.97
-_TORQUE_SHARE = 0.999
+SPEED_SHARE = 0.97
+TORQUE_SHARE = 0.999
 _HORIZON_TICKS = 5.0
 _GAIN_PER_S = 10.0
+_RIDGE = 1e-8
+_SLACK = 1e-7
 
 
-class AccelerationLimits:
-    """Accelerations (7,) from which no joint passes its velocity limit, nor fails to stop before its range.
+@compiled
+def fill_acceleration_bounds(seen: Seen, q: Array, v: Array, low: Array, high: Array) -> None:
+    """Accelerations from which no joint passes its velocity limit, nor fails to stop before its range.
 
     A velocity bound v_b is approached as q'' <= (v_b - q') / (5 T), so that a wrong inertia of the model does
     not carry a joint past it.
+
+    Args:
+        seen: Limits and control period.
+        q: Joint positions (n,) [rad].
+        v: Joint velocities (n,) [rad/s].
+        low: Filled with the lower bounds (n,) [rad/s^2].
+        high: Filled with the upper bounds (n,) [rad/s^2].
     """
-
-    def __init__(self, limits: JointLimits) -> None:
-        self._l = limits
-        self.torque = _TORQUE_SHARE * limits.torque
-
-    def bounds(self, q: Array, v: Array, dt_s: float) -> tuple[Array, Array]:
-        """Lower and upper accelerations at `q`, `v` (7,), each (7,) [rad/s^2]."""
-        limits = self._l
-        return _bounds(q, v, limits.q_min, limits.q_max, limits.velocity, limits.acceleration, dt_s)
-
-    def allows(self, torque: Array, qddot: Array, low: Array, high: Array) -> bool:
-        """Whether torque (7,) [N m] and acceleration (7,) [rad/s^2] keep all limits."""
-        return _allows(torque, self.torque, qddot, low, high)
-
-
-@compiled
-def _bounds(
-    q: Array, v: Array, q_min: Array, q_max: Array, v_max: Array, a_max: Array, dt: float
-) -> tuple[Array, Array]:
-    low, high = np.empty(7), np.empty(7)
-    for i in range(7):
-        top = _SPEED_SHARE * v_max[i]
-        up = min(top, stopping_speed(q_max[i] - q[i], BRAKING_SHARE * a_max[i], _GAIN_PER_S, dt))
-        down = min(top, stopping_speed(q[i] - q_min[i], BRAKING_SHARE * a_max[i], _GAIN_PER_S, dt))
+    dt = seen.dt_s
+    for i in range(q.size):
+        top, stop = SPEED_SHARE * seen.v_max[i], BRAKING_SHARE * seen.a_max[i]
+        up = min(top, stopping_speed(seen.q_max[i] - q[i], stop, _GAIN_PER_S, dt))
+        down = min(top, stopping_speed(q[i] - seen.q_min[i], stop, _GAIN_PER_S, dt))
         high[i] = (up - v[i]) / (_HORIZON_TICKS * dt)
         low[i] = (-down - v[i]) / (_HORIZON_TICKS * dt)
-    return low, high
 
 
 @compiled
-def _allows(torque: Array, torque_limit: Array, qddot: Array, low: Array, high: Array) -> bool:
-    inside = True
-    for i in range(7):
-        inside = inside and abs(torque[i]) <= torque_limit[i] and low[i] <= qddot[i] <= high[i]
-    return inside
+def allows(torque: Array, torque_limit: Array, qddot: Array, low: Array, high: Array) -> bool:
+    """Whether torque (n,) [N m] and acceleration (n,) [rad/s^2] keep all limits."""
+    for i in range(torque.size):
+        if not (abs(torque[i]) <= torque_limit[i] and low[i] <= qddot[i] <= high[i]):
+            return False
+    return True
 
 
-class PriorityProgram:
+@compiled
+def prioritised(
+    M: Array,
+    constant: Array,
+    J: Array,
+    a: Array,
+    posture: Array,
+    low: Array,
+    high: Array,
+    torque_limit: Array,
+    qddot: Array,
+) -> int:
     """Three quadratic programs: RCM rows first, then the tip rows, then the posture.
 
     Each minimises what its rows lack and holds what the ones above attained,
@@ -68,65 +71,73 @@ class PriorityProgram:
         min |J_i q'' - a_i|^2   subject to   J_j q'' = attained_j (j < i),  low <= q'' <= high,
                                              |M q'' + constant| <= tau_max
 
-    so that under a limit the posture gives way first, then the tip, and the RCM last.
+    so that under a limit the posture gives way first, then the tip, and the RCM last. What a level attains
+    meets the rows of the next, so that none of them can be lost: a level without an answer is a failure.
+
+    Args:
+        M: Inertia (n, n).
+        constant: Torque at zero acceleration (n,) [N m].
+        J: Tip rows, then RCM rows (3 or 5, n).
+        a: Their accelerations (3 or 5,).
+        posture: Acceleration of the posture (n,) [rad/s^2].
+        low: Lower acceleration bounds (n,) [rad/s^2].
+        high: Upper acceleration bounds (n,) [rad/s^2].
+        torque_limit: tau_max (n,) [N m].
+        qddot: Filled with the joint acceleration (n,) [rad/s^2].
+
+    Returns:
+        GOES_ON, or INFEASIBLE if no acceleration keeps all limits.
     """
-
-    def __init__(self) -> None:
-        self._levels = (DenseQp(), DenseQp(), DenseQp())
-
-    def solve(
-        self,
-        M: Array,
-        constant: Array,
-        J: Array,
-        a: Array,
-        posture: Array,
-        low: Array,
-        high: Array,
-        limits: AccelerationLimits,
-    ) -> Array:
-        """Joint acceleration (7,) [rad/s^2].
-
-        Args:
-            M: Inertia (7, 7).
-            constant: Torque at zero acceleration (7,) [N m].
-            J: Tip rows, then RCM rows (3 or 5, 7).
-            a: Their accelerations (3 or 5,).
-            posture: Acceleration of the posture (7,) [rad/s^2].
-            low: Lower acceleration bounds (7,).
-            high: Upper acceleration bounds (7,).
-            limits: Whose torque limits hold.
-
-        Raises:
-            ControlFailure: If no acceleration keeps all limits.
-        """
-        inside = (-limits.torque - constant, limits.torque - constant)
-        rows, lower, upper = M, inside[0], inside[1]
-        found = posture
-        for solver, J_i, a_i in zip(self._levels, (J[3:], J[:3], None), (a[3:], a[:3], posture), strict=True):
-            if J_i is not None and len(J_i) == 0:
-                continue
-            H, f = _objective(J_i, a_i, M)
-            x = solver.solve(H, f, low, high, rows, lower, upper)
-            if x is None:
-                break
-            found = x
-            if J_i is not None:
-                attained = J_i @ x
-                rows = np.concatenate((rows, J_i))
-                lower = np.concatenate((lower, attained - _SLACK))
-                upper = np.concatenate((upper, attained + _SLACK))
-        if found is posture:
-            data = {"M": M, "constant": constant, "low": low, "high": high}
-            raise ControlFailure(Outcome.INFEASIBLE, "no joint acceleration keeps all limits", data)
-        return found
+    n, m = posture.size, J.shape[0]
+    rows = np.empty((n + m, n))
+    lower, upper = np.empty(n + m), np.empty(n + m)
+    H, f = np.empty((n, n)), np.empty(n)
+    work, active, side = (
+        np.zeros((2 * n + 7, n + 1)),
+        np.zeros(n + 1, np.int64),
+        np.zeros(2 * n + m, np.int64),
+    )
+    rows[:n] = M
+    for i in range(n):
+        lower[i], upper[i] = -torque_limit[i] - constant[i], torque_limit[i] - constant[i]
+    held = n
+    for level in range(3):
+        begin, end = (3, m) if level == 0 else (0, 3)
+        if level < 2 and end == begin:
+            continue
+        if level < 2:
+            _least_squares(J[begin:end], a[begin:end], H, f)
+        else:
+            H[:] = M
+            times(M, posture, f)
+            for i in range(n):
+                f[i] = -f[i]
+        found = solve(
+            H, f, low, high, rows[:held], lower[:held], upper[:held], side[: n + held], qddot, work, active
+        )
+        if found != SOLVED:
+            return INFEASIBLE
+        for i in range(begin, end):
+            if level < 2:
+                s = 0.0
+                for j in range(n):
+                    rows[held, j] = J[i, j]
+                    s += J[i, j] * qddot[j]
+                lower[held], upper[held] = s - _SLACK, s + _SLACK
+                held += 1
+    return GOES_ON
 
 
-def _objective(J: Array | None, a: Array, M: Array) -> tuple[Array, Array]:
-    if J is None:
-        return M, -M @ a
-    return J.T @ J + _RIDGE * np.eye(7), -J.T @ a
-
-
-_RIDGE = 1e-8
-_SLACK = 1e-7
+@compiled
+def _least_squares(J: Array, a: Array, H: Array, f: Array) -> None:
+    """H = J^T J and a small ridge, f = -J^T a."""
+    for i in range(f.size):
+        s = 0.0
+        for k in range(a.size):
+            s -= J[k, i] * a[k]
+        f[i] = s
+        for j in range(f.size):
+            s = _RIDGE if i == j else 0.0
+            for k in range(a.size):
+                s += J[k, i] * J[k, j]
+            H[i, j] = s

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from surgsim.compiled import compiled
 from surgsim.models.arm import ArmModel, Kinematics
+from surgsim.tick.algebra import back_substitute_rows, factor, outer_product
 
 Array = NDArray[np.float64]
 
@@ -23,15 +24,16 @@ def manipulability(J: Array) -> float:
 
 @compiled
 def jacobian_gradient(J: Array, z: Array) -> Array:
-    """Derivative of the translational Jacobian: H (7, 3, 7) with H[i] = dJ/dq_i [m/rad^2].
+    """Derivative of the translational Jacobian: H (n, 3, n) with H[i] = dJ/dq_i [m/rad^2].
 
     Args:
-        J: Translational Jacobian (3, 7) [m/rad].
-        z: Joint axes as rows (7, 3).
+        J: Translational Jacobian (3, n) [m/rad].
+        z: Joint axes as rows (n, 3).
     """
-    H = np.empty((7, 3, 7))
-    for i in range(7):
-        for j in range(i, 7):
+    n = J.shape[1]
+    H = np.empty((n, 3, n))
+    for i in range(n):
+        for j in range(i, n):
             x = z[i, 1] * J[2, j] - z[i, 2] * J[1, j]
             y = z[i, 2] * J[0, j] - z[i, 0] * J[2, j]
             w = z[i, 0] * J[1, j] - z[i, 1] * J[0, j]
@@ -43,57 +45,84 @@ def jacobian_gradient(J: Array, z: Array) -> Array:
 
 @compiled
 def diamond(J: Array, H: Array) -> Array:
-    """J <> h = [vec(J h_i^T)^T]_i (7, 9); eq. (18) of the VPRNN paper, column-major vec."""
-    D = np.zeros((7, 9))
-    for i in range(7):
+    """J <> h = [vec(J h_i^T)^T]_i (n, 9); eq. (18) of the VPRNN paper, column-major vec."""
+    n = J.shape[1]
+    D = np.empty((n, 9))
+    for i in range(n):
         for b in range(3):
             for a in range(3):
-                for c in range(7):
-                    D[i, 3 * b + a] += J[a, c] * H[i, b, c]
+                s = 0.0
+                for c in range(n):
+                    s += J[a, c] * H[i, b, c]
+                D[i, 3 * b + a] = s
     return D
 
 
 @compiled
-def log_manipulability_gradient(J: Array, z: Array) -> Array:
-    """Gradient of ln(mu) of the translational Jacobian, (7,) [1/rad].
+def fill_log_manipulability_gradient(J: Array, z: Array, out: Array) -> bool:
+    """Gradient of ln(mu) of the translational Jacobian, `out` (n,) [1/rad]; False if J has lost rank.
 
     d(ln mu)/dq_i = tr(dJ/dq_i J^T (J J^T)^-1), equal to (J <> h) psi with psi = vec((J J^T)^-1).
+    """
+    n = J.shape[1]
+    A, B = np.empty((3, 3)), np.empty((n, 3))
+    outer_product(J, J, A)
+    if not factor(A):
+        return False
+    for j in range(n):
+        for a in range(3):
+            B[j, a] = J[a, j]
+    back_substitute_rows(A, B)
+    H = jacobian_gradient(J, z)
+    for i in range(n):
+        s = 0.0
+        for a in range(3):
+            for b in range(n):
+                s += B[b, a] * H[i, a, b]
+        out[i] = s
+    return True
+
+
+def log_manipulability_gradient(J: Array, z: Array) -> Array:
+    """Gradient of ln(mu) of the translational Jacobian, (n,) [1/rad].
 
     Raises:
         numpy.linalg.LinAlgError: If J has lost rank.
     """
-    B = np.linalg.solve(J @ J.T, J)
-    H = jacobian_gradient(J, z)
-    gradient = np.zeros(7)
-    for i in range(7):
-        for a in range(3):
-            for b in range(7):
-                gradient[i] += B[a, b] * H[i, a, b]
+    gradient = np.empty(J.shape[1])
+    if not fill_log_manipulability_gradient(np.ascontiguousarray(J), np.ascontiguousarray(z), gradient):
+        raise np.linalg.LinAlgError("Singular matrix")
     return gradient
 
 
 def velocity_product_accelerations(kin: Kinematics, v: Array) -> tuple[Array, Array]:
-    """Jv' v and Jw' v at joint velocities `v` (7,) [rad/s]: tip and angular acceleration, each (3,).
-
-    Jv' v = sum_ij dJ_j/dq_i v_i v_j, and Jw' v = sum_{i<j} z_i x z_j v_i v_j for revolute joints.
-    """
-    return _velocity_products(kin.Jv_WT, kin.z_W, v)
+    """Jv' v and Jw' v at joint velocities `v` (n,) [rad/s]: tip and angular acceleration, each (3,)."""
+    linear, angular = np.empty(3), np.empty(3)
+    fill_velocity_products(kin.Jv_WT, kin.z_W, v, linear, angular)
+    return linear, angular
 
 
 @compiled
-def _velocity_products(J: Array, z: Array, v: Array) -> tuple[Array, Array]:
-    linear, angular = np.zeros(3), np.zeros(3)
-    H = jacobian_gradient(J, z)
-    for i in range(7):
-        for j in range(7):
-            for a in range(3):
-                linear[a] += H[i, a, j] * v[i] * v[j]
-        for j in range(i + 1, 7):
+def fill_velocity_products(J: Array, z: Array, v: Array, linear: Array, angular: Array) -> None:
+    """Fill Jv' v and Jw' v, each (3,).
+
+    Jv' v = sum_ij dJ_j/dq_i v_i v_j with dJ_j/dq_i = z_min(i,j) x J_max(i,j), and
+    Jw' v = sum_{i<j} z_i x z_j v_i v_j, for revolute joints.
+    """
+    linear[:] = 0.0
+    angular[:] = 0.0
+    n = v.size
+    for i in range(n):
+        for j in range(i, n):
+            w = v[i] * v[j] if i == j else 2.0 * v[i] * v[j]
+            linear[0] += w * (z[i, 1] * J[2, j] - z[i, 2] * J[1, j])
+            linear[1] += w * (z[i, 2] * J[0, j] - z[i, 0] * J[2, j])
+            linear[2] += w * (z[i, 0] * J[1, j] - z[i, 1] * J[0, j])
+        for j in range(i + 1, n):
             w = v[i] * v[j]
             angular[0] += w * (z[i, 1] * z[j, 2] - z[i, 2] * z[j, 1])
             angular[1] += w * (z[i, 2] * z[j, 0] - z[i, 0] * z[j, 2])
             angular[2] += w * (z[i, 0] * z[j, 1] - z[i, 1] * z[j, 0])
-    return linear, angular
 
 
 def manipulability_series(arm: ArmModel, q: Array) -> tuple[Array, Array]:

@@ -1,171 +1,139 @@
 """What the arm's measured torque and motion tell: the disturbance torque, and the actuation delay."""
 
-from dataclasses import dataclass, replace
-from typing import Protocol
+import math
 
 import numpy as np
 from numpy.typing import NDArray
 
 from surgsim.compiled import compiled
-from surgsim.models.arm import Dynamics
 
 Array = NDArray[np.float64]
-
-
-class Observed(Protocol):
-    """What is measured at a tick, with the nominal dynamics there."""
-
-    @property
-    def dt_s(self) -> float:
-        """Control period [s]."""
-        ...
-
-    @property
-    def v(self) -> Array:
-        """Joint velocities (7,) [rad/s]."""
-        ...
-
-    @property
-    def tau_measured(self) -> Array:
-        """Joint torques that acted over the last period (7,) [N m]."""
-        ...
-
-    @property
-    def dyn(self) -> Dynamics | None:
-        """Nominal dynamics; None on the kinematic plant, where there is nothing to observe."""
-        ...
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ObserverState:
-    """State of the disturbance observer.
-
-    Attributes:
-        disturbance: Estimated disturbance torque d (7,) [N m], in M q'' + bias + D q' = tau + d.
-        inertia: M + T D of the last tick (7, 7), None before the first.
-        rest: bias + D q' - d of the last tick (7,) [N m].
-        v: Measured velocity of the last tick (7,) [rad/s].
-    """
-
-    disturbance: Array
-    inertia: Array | None = None
-    rest: Array | None = None
-    v: Array | None = None
-
-
-class DisturbanceObserver:
-    """Attributes unexplained changes of the joint velocities to a disturbance torque.
-
-        v^(k+1) = v(k) + T (M + T D)^-1 (tau + d - bias - D v)
-        d      += L (M + T D) (v(k+1) - v^(k+1)) / T
-
-    with tau the torque that was measured over the period. d follows a constant disturbance as a first-order
-    lag with the time constant T / L. It is the discrete form of the momentum observer of De Luca et al. 2006,
-    for MuJoCo's implicit joint damping.
-
-    Args:
-        gain: L, from 0 (off) to 1 (dead beat).
-        damping: D (7,) [N m s/rad].
-    """
-
-    def __init__(self, gain: float, damping: Array) -> None:
-        self._gain = gain
-        self._damping = damping
-
-    def start(self) -> ObserverState:
-        """Nothing known."""
-        return ObserverState(disturbance=np.zeros(7))
-
-    def update(
-        self, state: ObserverState, p: Observed, share: float = 1.0, offset: Array | None = None
-    ) -> ObserverState:
-        """Take in the motion since the last tick.
-
-        Args:
-            state: The state so far.
-            p: What is measured now.
-            share: Share of the gain to be used.
-            offset: By how much the measured torque is off (7,) [N m]; taken off it.
-        """
-        assert p.dyn is not None, "a disturbance torque cannot be seen without dynamics"
-        d = state.disturbance
-        if state.inertia is not None and state.rest is not None and state.v is not None:
-            tau = p.tau_measured if offset is None else p.tau_measured - offset
-            d = _corrected(d, state.inertia, state.rest, state.v, p.v, tau, share * self._gain, p.dt_s)
-        inertia = p.dyn.mass_matrix + p.dt_s * np.diag(self._damping)
-        rest = p.dyn.bias + self._damping * p.v - d
-        return ObserverState(disturbance=d, inertia=inertia, rest=rest, v=p.v)
-
-
-@compiled
-def _corrected(
-    d: Array, inertia: Array, rest: Array, v_last: Array, v: Array, tau: Array, gain: float, dt: float
-) -> Array:
-    """D + L ((M + T D) (v - v_last) / T - (tau - rest))."""
-    return d + gain * (inertia @ ((v - v_last) / dt) - (tau - rest))
-
-
 OFFSET_MEMORY_S = 0.05
 """Time constant of the mean difference between measured and commanded torque [s]."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class DelayEstimate:
-    """By how many periods the measured torque lags behind the commanded one.
-
-    Each candidate delay is scored by a fading sum of its squared mismatch; the best one counts, the shorter
-    one where they are equal, as at rest.
-
-    Attributes:
-        commands: Torques commanded, newest first (n, 7) [N m]; NaN before the first.
-        scores: Fading squared mismatch of each delay 0..n-1 [(N m)^2].
-        offset: Slow mean of measured less commanded torque (7,) [N m]: of a drive or sensor that is biased.
-        ticks: The estimate.
-    """
-
-    commands: Array
-    scores: Array
-    offset: Array
-    ticks: int = 0
-
-    @staticmethod
-    def start(most: int) -> "DelayEstimate":
-        """No command yet, no delay."""
-        return DelayEstimate(
-            commands=np.full((most + 1, 7), np.nan), scores=np.zeros(most + 1), offset=np.zeros(7)
-        )
-
-    @property
-    def in_flight(self) -> Array:
-        """Torques commanded and not yet acting, oldest first (ticks, 7) [N m]."""
-        return np.ascontiguousarray(self.commands[: self.ticks][::-1])
-
-    def update(self, tau_measured: Array, dt_s: float) -> "DelayEstimate":
-        """Compare the torque of the last period with what was commanded 1, 2, ... ticks ago."""
-        scores, ticks = _score(self.commands, self.scores, tau_measured)
-        offset, expected = self.offset, self.commands[ticks]
-        if np.isfinite(self.commands[-1, 0]):  # before, a delay may not have shown
-            offset = offset + dt_s / OFFSET_MEMORY_S * (tau_measured - expected - offset)
-        return replace(self, scores=scores, ticks=ticks, offset=offset)
-
-    def sent(self, torque: Array) -> "DelayEstimate":
-        """Remember the torque (7,) [N m] commanded now."""
-        return replace(self, commands=np.concatenate((torque[None], self.commands[:-1])))
+def observer_size(n: int) -> int:
+    """Length of the disturbance observer's memory: d, rest and v (n,) each, inertia (n, n)."""
+    return n * (n + 3)
 
 
 @compiled
-def _score(commands: Array, scores: Array, measured: Array) -> tuple[Array, int]:
-    out = np.empty(scores.size)
+def observe(
+    memory: Array,
+    first: bool,
+    M: Array,
+    bias: Array,
+    damping: Array,
+    v: Array,
+    tau: Array,
+    gain: float,
+    dt: float,
+) -> Array:
+    """Attribute unexplained changes of the joint velocities to a disturbance torque d, a view of `memory`.
+
+        v^(k+1) = v(k) + T (M + T D)^-1 (tau + d - bias - D v)
+        d      += L (M + T D) (v(k+1) - v^(k+1)) / T
+
+    with tau the torque that was measured over the period. d, in M q'' + bias + D q' = tau + d, follows a
+    constant disturbance as a first-order lag with the time constant T / L. It is the discrete form of the
+    momentum observer of De Luca et al. 2006, for MuJoCo's implicit joint damping.
+
+    Args:
+        memory: Of `observer_size`, changed in place: d, rest = bias + D q' - d of the last tick [N m], its
+            velocity [rad/s], its inertia M + T D.
+        first: Whether nothing is known yet.
+        M: Nominal inertia (n, n).
+        bias: Nominal Coriolis, centrifugal and gravity torque (n,) [N m].
+        damping: D (n,) [N m s/rad].
+        v: Joint velocities now (n,) [rad/s].
+        tau: Torque that acted over the last period (n,) [N m].
+        gain: L, from 0 (off) to 1 (dead beat).
+        dt: Control period T [s].
+    """
+    n = v.size
+    d, rest, last = memory[:n], memory[n : 2 * n], memory[2 * n : 3 * n]
+    inertia = memory[3 * n : 3 * n + n * n].reshape((n, n))
+    if first:
+        d[:] = 0.0
+    else:
+        for i in range(n):
+            s = 0.0
+            for j in range(n):
+                s += inertia[i, j] * ((v[j] - last[j]) / dt)
+            d[i] += gain * (s - (tau[i] - rest[i]))
+    for i in range(n):
+        for j in range(n):
+            inertia[i, j] = M[i, j]
+        inertia[i, i] += dt * damping[i]
+        rest[i] = bias[i] + damping[i] * v[i] - d[i]
+        last[i] = v[i]
+    return d
+
+
+def delay_size(n: int, most: int) -> int:
+    """Length of the delay estimate's memory: commands (most + 1, n), scores (most + 1,), offset (n,), ticks."""
+    return (most + 1) * (n + 1) + n + 1
+
+
+@compiled
+def estimate_delay(memory: Array, first: bool, measured: Array, most: int, dt: float) -> int:
+    """By how many periods the measured torque lags behind the commanded one, 0 to `most`.
+
+    Each candidate delay is scored by a fading sum of its squared mismatch; the best one counts, the shorter
+    one where they are equal, as at rest. The slow mean of measured less commanded torque, of a drive or
+    sensor that is biased, is kept beside it, see `torque_offset`.
+
+    Args:
+        memory: Of `delay_size`, changed in place.
+        first: Whether no command is known yet.
+        measured: Torque of the last period (n,) [N m].
+        most: Longest delay in periods.
+        dt: Control period [s].
+    """
+    n = measured.size
+    commands = memory[: (most + 1) * n].reshape((most + 1, n))
+    scores = memory[(most + 1) * n : (most + 1) * (n + 1)]
+    offset = torque_offset(memory, most, n)
+    if first:
+        commands[:] = math.nan
+        scores[:] = 0.0
+        offset[:] = 0.0
+    best = _score(commands, scores, measured)
+    if math.isfinite(commands[most, 0]):  # before, a delay may not have shown
+        for i in range(n):
+            offset[i] += dt / OFFSET_MEMORY_S * (measured[i] - commands[best, i] - offset[i])
+    memory[memory.size - 1] = best
+    return best
+
+
+@compiled
+def torque_offset(memory: Array, most: int, n: int) -> Array:
+    """The slow mean of measured less commanded torque (n,) [N m], a view of the delay estimate's memory."""
+    return memory[(most + 1) * (n + 1) : (most + 1) * (n + 1) + n]
+
+
+@compiled
+def remember_command(memory: Array, most: int, torque: Array) -> None:
+    """Remember the torque (n,) [N m] that is commanded now; the newest comes first."""
+    n = torque.size
+    for i in range((most + 1) * n - 1, n - 1, -1):
+        memory[i] = memory[i - n]
+    for i in range(n):
+        memory[i] = torque[i]
+
+
+@compiled
+def _score(commands: Array, scores: Array, measured: Array) -> int:
     best = 0
     for n in range(scores.size):
-        row = n if np.isfinite(commands[n, 0]) else n - 1
-        while row > 0 and not np.isfinite(commands[row, 0]):
+        row = n if math.isfinite(commands[n, 0]) else n - 1
+        while row > 0 and not math.isfinite(commands[row, 0]):
             row -= 1  # before the first command, the queue held the first one
         mismatch = 0.0
-        if np.isfinite(commands[row, 0]):
-            for i in range(7):
-                mismatch += (measured[i] - commands[row, i]) ** 2
-        out[n] = 0.9 * scores[n] + mismatch
-        if out[n] < out[best] - 1e-12 - 1e-6 * out[best]:
+        if math.isfinite(commands[row, 0]):
+            for i in range(measured.size):
+                mismatch += (measured[i] - commands[row, i]) * (measured[i] - commands[row, i])
+        scores[n] = 0.9 * scores[n] + mismatch
+        if scores[n] < scores[best] - 1e-12 - 1e-6 * scores[best]:
             best = n
-    return out, best
+    return best

@@ -1,14 +1,13 @@
 """The velocity-level problem that every resolver is given at a tick, and what it answers."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from surgsim.compiled import compiled
+from surgsim.control.bounds import fill_braking_bounds, fill_velocity_bounds
 from surgsim.control.rcm import Rcm
-from surgsim.errors import Outcome
 from surgsim.models.arm import Kinematics
 from surgsim.models.build import JointLimits
 from surgsim.tasks.base import TipCommand
@@ -16,22 +15,6 @@ from surgsim.tasks.base import TipCommand
 Array = NDArray[np.float64]
 NO_VALUES = np.zeros(0)
 NO_VALUES.flags.writeable = False
-
-
-class ControlFailure(Exception):
-    """The controller cannot give a command: the run ends with this outcome.
-
-    Attributes:
-        outcome: How the run ends.
-        detail: What the controller saw, for the person who looks into it.
-        data: Arrays that let the failure be examined, e.g. the infeasible QP.
-    """
-
-    def __init__(self, outcome: Outcome, detail: str, data: Mapping[str, Array] | None = None) -> None:
-        self.outcome = outcome
-        self.detail = detail
-        self.data = dict(data or {})
-        super().__init__(detail)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -92,89 +75,38 @@ class Resolution:
 
 
 def velocity_bounds(q: Array, limits: JointLimits, position_gain_per_s: float) -> tuple[Array, Array]:
-    """Omega of the VPRNN paper: velocity limits, tightened as a joint nears its position limit.
-
-    max(-v_max, -alpha (q - q_min)) <= q' <= min(v_max, alpha (q_max - q))
-
-    A joint already past its limit gets the bound that drives it back, capped by its velocity limit.
+    """Omega at joint positions `q` (n,) [rad], see `surgsim.control.bounds.fill_velocity_bounds`.
 
     Returns:
-        Lower and upper bounds, each (7,) [rad/s].
+        Lower and upper bounds, each (n,) [rad/s].
     """
-    return _velocity_bounds(q, limits.q_min, limits.q_max, limits.velocity, position_gain_per_s)
-
-
-@compiled
-def _velocity_bounds(
-    q: Array, q_min: Array, q_max: Array, velocity: Array, gain: float
-) -> tuple[Array, Array]:
-    lower = np.maximum(-velocity, gain * (q_min - q))
-    upper = np.minimum(velocity, gain * (q_max - q))
-    return np.minimum(lower, velocity), np.maximum(upper, -velocity)
-
-
-BRAKING_SHARE = 0.5
+    lower, upper = np.empty(q.size), np.empty(q.size)
+    low, high, speed = limits.q_min, limits.q_max, limits.velocity
+    fill_velocity_bounds(q, low, high, speed, position_gain_per_s, lower, upper)
+    return lower, upper
 
 
 def braking_bounds(problem: VelocityProblem, last: Array) -> tuple[Array, Array]:
-    """Omega with acceleration limits: reachable from `last` (7,) [rad/s], and able to stop in time.
-
-    |q' - last| <= a_max T, and the speed towards a position limit is one from which half of a_max
-    can stop in time: the task rows couple the joints, so that another joint may have to brake harder.
-    Where these exclude each other, Omega and the room to stop hold before the acceleration limit.
+    """Omega with acceleration limits, see `surgsim.control.bounds.fill_braking_bounds`.
 
     Returns:
-        Lower and upper bounds, each (7,) [rad/s].
+        Lower and upper bounds, each (n,) [rad/s].
     """
-    limits = problem.limits
-    return _braking_bounds(
-        problem.lower,
-        problem.upper,
-        problem.q,
+    p, limits = problem, problem.limits
+    low, high = np.empty(last.size), np.empty(last.size)
+    fill_braking_bounds(
+        p.q,
         last,
+        p.lower,
+        p.upper,
         limits.q_min,
         limits.q_max,
         limits.acceleration,
-        BRAKING_SHARE * limits.acceleration,
-        problem.position_gain_per_s,
-        problem.dt_s,
+        p.position_gain_per_s,
+        p.dt_s,
+        low,
+        high,
     )
-
-
-@compiled
-def stopping_speed(room: float, a: float, gain: float, dt: float) -> float:
-    """Speed from which `a` suffices to stay below gain * room, Omega's bound, until standstill.
-
-    The parabola of constant deceleration meets the line gain * room with equal slope at the speed a / gain.
-    One period's travel is taken off the room first.
-    """
-    if room <= a / gain**2:
-        return gain * max(room, 0.0)
-    reach = a * dt
-    return float(np.sqrt(reach * reach + 2.0 * a * (room - 0.5 * a / gain**2)) - reach)
-
-
-@compiled
-def _braking_bounds(
-    lower: Array,
-    upper: Array,
-    q: Array,
-    last: Array,
-    q_min: Array,
-    q_max: Array,
-    a: Array,
-    a_stop: Array,
-    gain: float,
-    dt: float,
-) -> tuple[Array, Array]:
-    low, high = np.empty(7), np.empty(7)
-    for i in range(7):
-        reach = a[i] * dt
-        high[i] = min(upper[i], max(stopping_speed(q_max[i] - q[i], a_stop[i], gain, dt), lower[i]))
-        low[i] = max(lower[i], min(-stopping_speed(q[i] - q_min[i], a_stop[i], gain, dt), upper[i]))
-        fastest, slowest = last[i] + reach, last[i] - reach
-        high[i] = min(high[i], fastest) if fastest >= low[i] else low[i]
-        low[i] = max(low[i], slowest) if slowest <= high[i] else high[i]
     return low, high
 
 
@@ -206,7 +138,7 @@ def _bounded(qdot: Array, lower: Array, upper: Array, J: Array, rhs: Array) -> t
     total = 0.0
     for i in range(J.shape[0]):
         row = -rhs[i]
-        for j in range(7):
+        for j in range(J.shape[1]):
             row += J[i, j] * inside[j]
         total += row * row
     return inside, np.sqrt(total)

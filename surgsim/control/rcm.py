@@ -18,7 +18,9 @@ from numpy.typing import NDArray
 
 from surgsim.compiled import compiled
 from surgsim.models.arm import Kinematics
-from surgsim.spatial import cross, skew
+from surgsim.spatial import cross as cross_product
+from surgsim.spatial import skew
+from surgsim.tick.algebra import cross, dot, times
 
 Array = NDArray[np.float64]
 
@@ -44,25 +46,48 @@ class Rcm:
 
 def rcm_kinematics(kin: Kinematics, p_WC: Array, v_WC: Array) -> Rcm:
     """RCM error and Jacobian for a trocar at `p_WC` (3,) [m] moving at `v_WC` (3,) [m/s]."""
-    error, jacobian, trocar_velocity, normals, depth = _rcm(
-        kin.p_WT, kin.R_WT, kin.Jv_WT, kin.Jw_WT, p_WC, v_WC
-    )
-    return Rcm(error=error, jacobian=jacobian, trocar_velocity=trocar_velocity, normals=normals, depth=depth)
+    n = kin.Jv_WT.shape[1]
+    error, jacobian, velocity, normals = np.empty(2), np.empty((2, n)), np.empty(2), np.empty((2, 3))
+    depth = fill_rcm(kin.p_WT, kin.R_WT, kin.Jv_WT, kin.Jw_WT, p_WC, v_WC, error, jacobian, velocity, normals)
+    return Rcm(error=error, jacobian=jacobian, trocar_velocity=velocity, normals=normals, depth=depth)
 
 
 @compiled
-def _rcm(
-    p: Array, R: Array, Jv: Array, Jw: Array, p_WC: Array, v_WC: Array
-) -> tuple[Array, Array, Array, Array, float]:
-    N = np.ascontiguousarray(R[:, :2].T)
-    r = p - p_WC
-    depth = R[0, 2] * r[0] + R[1, 2] * r[1] + R[2, 2] * r[2]
+def fill_rcm(
+    p: Array,
+    R: Array,
+    Jv: Array,
+    Jw: Array,
+    p_WC: Array,
+    v_WC: Array,
+    error: Array,
+    jacobian: Array,
+    velocity: Array,
+    normals: Array,
+) -> float:
+    """Fill e_N (2,), J_rcm (2, n), N C' (2,) and N (2, 3) of the module's equations; the depth s [m]."""
+    s = 0.0
+    for i in range(3):
+        s += R[i, 2] * (p[i] - p_WC[i])
+        normals[0, i] = R[i, 0]
+        normals[1, i] = R[i, 1]
+    for k in range(2):
+        e = rate = 0.0
+        for i in range(3):
+            e += normals[k, i] * (p[i] - p_WC[i])
+            rate += normals[k, i] * v_WC[i]
+        error[k], velocity[k] = e, rate
     # N [d]x has the rows n1 x d = -n2 and n2 x d = n1, since (n1, n2, d) is right-handed.
-    J = N @ Jv
-    turn = N @ Jw
-    J[0] -= depth * turn[1]
-    J[1] += depth * turn[0]
-    return N @ r, J, N @ v_WC, N, depth
+    for j in range(Jv.shape[1]):
+        moved0 = moved1 = turned0 = turned1 = 0.0
+        for i in range(3):
+            moved0 += normals[0, i] * Jv[i, j]
+            moved1 += normals[1, i] * Jv[i, j]
+            turned0 += normals[0, i] * Jw[i, j]
+            turned1 += normals[1, i] * Jw[i, j]
+        jacobian[0, j] = moved0 - s * turned1
+        jacobian[1, j] = moved1 + s * turned0
+    return s
 
 
 def rcm_bias_acceleration(
@@ -78,11 +103,13 @@ def rcm_bias_acceleration(
         linear: Jv' v (3,) [m/s^2].
         angular: Jw' v (3,) [rad/s^2].
     """
-    return _bias(kin.p_WT, kin.R_WT, kin.Jv_WT, kin.Jw_WT, v, p_WC, v_WC, linear, angular)
+    out = np.empty(2)
+    fill_rcm_bias(kin.p_WT, kin.R_WT, kin.Jv_WT, kin.Jw_WT, v, p_WC, v_WC, linear, angular, out)
+    return out
 
 
 @compiled
-def _bias(
+def fill_rcm_bias(
     p: Array,
     R: Array,
     Jv: Array,
@@ -92,15 +119,26 @@ def _bias(
     v_WC: Array,
     linear: Array,
     angular: Array,
-) -> Array:
-    d = np.ascontiguousarray(R[:, 2])
-    r = p - p_WC
-    r_dot = Jv @ v - v_WC
-    omega = Jw @ v
-    d_dot = np.cross(omega, d)
-    d_ddot = np.cross(angular, d) + np.cross(omega, d_dot)
-    depth_rate = d_dot @ r + d @ r_dot
-    return np.ascontiguousarray(R[:, :2].T) @ (linear - (d @ r) * d_ddot - 2.0 * depth_rate * d_dot)
+    out: Array,
+) -> None:
+    """Fill `out` (2,) with N (r'' - s d'' - 2 s' d') at zero joint and trocar acceleration."""
+    d, d_dot, d_ddot, turned = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
+    r, r_dot, omega = np.empty(3), np.empty(3), np.empty(3)
+    times(Jv, v, r_dot)
+    times(Jw, v, omega)
+    for i in range(3):
+        d[i] = R[i, 2]
+        r[i] = p[i] - p_WC[i]
+        r_dot[i] -= v_WC[i]
+    cross(omega, d, d_dot)
+    cross(angular, d, d_ddot)
+    cross(omega, d_dot, turned)
+    depth, depth_rate = dot(d, r), dot(d_dot, r) + dot(d, r_dot)
+    for k in range(2):
+        s = 0.0
+        for i in range(3):
+            s += R[i, k] * (linear[i] - depth * (d_ddot[i] + turned[i]) - 2.0 * depth_rate * d_dot[i])
+        out[k] = s
 
 
 def rcm_cross_form(kin: Kinematics, p_WC: Array) -> tuple[Array, Array]:
@@ -111,4 +149,4 @@ def rcm_cross_form(kin: Kinematics, p_WC: Array) -> tuple[Array, Array]:
     d = kin.R_WT[:, 2]
     r = kin.p_WT - p_WC
     D = skew(d)
-    return cross(d, r), D @ kin.Jv_WT + skew(r) @ D @ kin.Jw_WT
+    return cross_product(d, r), D @ kin.Jv_WT + skew(r) @ D @ kin.Jw_WT

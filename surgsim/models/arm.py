@@ -5,6 +5,7 @@ the payload, friction or inertia errors that a scenario gives the plant.
 """
 
 from dataclasses import dataclass
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -63,6 +64,7 @@ class ArmModel:
         data, site = self._data, self._scene.tip_site
         self._tip, self._rotation = data.site_xpos[site], data.site_xmat[site].reshape(3, 3)
         self._axes, self._anchors = data.xaxis, data.xanchor
+        self._held: list[mujoco.MjData] = []
 
     @property
     def scene(self) -> Scene:
@@ -78,6 +80,22 @@ class ArmModel:
     def damping(self) -> Array:
         """Viscous joint damping of the nominal model (7,) [N m s/rad]."""
         return np.array(self._model.dof_damping, dtype=float)
+
+    def point(self, record: Any) -> None:
+        """Let a `surgsim.tick.arrays.Model` record evaluate this arm, with data of its own.
+
+        This object must outlive the record.
+        """
+        model, data, site = self._model, mujoco.MjData(self._model), self._scene.tip_site
+        self._held.append(data)
+        record.model, record.data, record.site = model._address, data._address, site
+        record.qpos, record.qvel = data.qpos.ctypes.data, data.qvel.ctypes.data
+        record.site_xpos, record.site_xmat = (
+            data.site_xpos[site].ctypes.data,
+            data.site_xmat[site].ctypes.data,
+        )
+        record.xaxis, record.xanchor = data.xaxis.ctypes.data, data.xanchor.ctypes.data
+        record.damping[:] = self.damping
 
     def kinematics(self, q: Array) -> Kinematics:
         """Kinematics at joint positions `q` (7,) [rad]."""

@@ -22,12 +22,16 @@ the funnel's mouth stays outside the bore until it is drawn back.
 Own modelling; measured ranges of the parameters and their sources are in docs/physical_port.md.
 """
 
+from typing import ClassVar
+
 import numpy as np
 from numpy.typing import NDArray
 
 from surgsim.compiled import compiled
 from surgsim.models.config import WallConfig
-from surgsim.spatial import cross as _cross
+from surgsim.tick.algebra import cross, dot
+from surgsim.tick.arrays import Record, World
+from surgsim.tick.views import body_place, doubles, site_place, vector
 
 Array = NDArray[np.float64]
 FUNNEL_LENGTH_M = 0.010
@@ -40,7 +44,72 @@ START_REACH_M = 0.005
 """A shaft that starts this near to the bore is in it."""
 
 
-cross = compiled(_cross)
+class Push(Record):
+    """Generalized forces of the bore at one instant.
+
+    Attributes:
+        contact_arm: Contact's joint torques (n,) [N m].
+        contact_cannula: Its force on the cannula's slides (3,) [N].
+        seal_arm: Seal's joint torques (n,) [N m].
+        seal_cannula: Its force on the slides (3,) [N].
+        stored: Elastic energy k p²/2 and sigma_0 z²/2 (2,) [J].
+        force: F of the shaft on the cannula (3,) [N].
+        memory: Whether the run has begun, whether the shaft is in the bore, s [m] and z [m] (4,).
+    """
+
+    SHAPES: ClassVar[dict[str, str]] = {
+        "contact_arm": "n",
+        "contact_cannula": "3",
+        "seal_arm": "n",
+        "seal_cannula": "3",
+        "stored": "2",
+        "force": "3",
+        "memory": "4",
+    }
+    contact_arm: Array
+    contact_cannula: Array
+    seal_arm: Array
+    seal_cannula: Array
+    stored: Array
+    force: Array
+    memory: Array
+
+
+class Bore(Record):
+    """What the law of the bore needs besides the world, and where its forces go.
+
+    Attributes:
+        cannula: The cannula's body.
+        first_slide: Where the cannula's joints begin.
+        first_dof: Where their velocities begin.
+        parameters: From `law` (6,).
+        frame: Rotation of the port's frame (3, 3).
+        stiffness: Of the cannula's slides (3,) [N/m].
+        damping: Of the cannula's slides (3,) [N s/m].
+        offset: Displacement of the place of rest in the port's frame (3,) [m].
+        velocity: Its velocity (3,) [m/s].
+        drive: Force of the wall's motion on the slides (3,) [N].
+        acting: What acted at the last `act`.
+        trial: What would act at the present state.
+    """
+
+    SHAPES: ClassVar[dict[str, str]] = {
+        "parameters": "6",
+        "frame": "3 3",
+        **{name: "3" for name in ("stiffness", "damping", "offset", "velocity", "drive")},
+    }
+    cannula: int
+    first_slide: int
+    first_dof: int
+    parameters: Array
+    frame: Array
+    stiffness: Array
+    damping: Array
+    offset: Array
+    velocity: Array
+    drive: Array
+    acting: Push
+    trial: Push
 
 
 def law(wall: WallConfig, clearance_m: float) -> Array:
@@ -58,52 +127,54 @@ def law(wall: WallConfig, clearance_m: float) -> Array:
 
 
 @compiled
-def act(
-    entry: Array,
-    tip: Array,
-    centre: Array,
-    anchors: Array,
-    axes: Array,
-    slides: Array,
-    qvel: Array,
-    slide_qvel: Array,
-    parameters: Array,
-    memory: Array,
-    contact_arm: Array,
-    contact_cannula: Array,
-    seal_arm: Array,
-    seal_cannula: Array,
-    stored: Array,
-) -> Array:
-    """Generalized forces of contact and seal, by the Jacobian's transpose.
+def drag(bore: Bore, world: World) -> None:
+    """Refer the wall's spring and damper to the moved place of rest: K o + D o' on the slides."""
+    applied = vector(world.qfrc_applied, world.nv)
+    for k in range(3):
+        o = v = 0.0
+        for i in range(3):
+            o += world.port_offset[i] * bore.frame[i, k]
+            v += world.port_velocity[i] * bore.frame[i, k]
+        bore.offset[k], bore.velocity[k] = o, v
+        bore.drive[k] = bore.stiffness[k] * o + bore.damping[k] * v
+        applied[bore.first_dof + k] += bore.drive[k]
 
-    Args:
-        entry: E (3,) [m].
-        tip: Tip (3,) [m].
-        centre: C (3,) [m].
-        anchors: Points on the arm's axes (7, 3) [m].
-        axes: Directions of the arm's axes (7, 3).
-        slides: Directions of the cannula's slides (3, 3).
-        qvel: Joint velocities (7,) [rad/s].
-        slide_qvel: Velocities of the slides (3,) [m/s].
-        parameters: From `law`.
-        memory: (4,) whether the run has begun, whether the shaft is in the bore, s [m] and z [m]; zeros at
-            the start, changed in place.
-        contact_arm: Filled with the contact's joint torques (7,) [N m].
-        contact_cannula: Filled with its force on the slides (3,) [N].
-        seal_arm: Filled with the seal's joint torques (7,) [N m].
-        seal_cannula: Filled with its force on the slides (3,) [N].
-        stored: Filled with k p²/2 and sigma_0 z²/2 (2,) [J].
 
-    Returns:
-        F (3,) [N].
-    """
-    contact, seal = np.zeros(3), np.zeros(3)
-    velocity = _relative_velocity(centre, anchors, axes, qvel, slides, slide_qvel)
-    _forces(entry, tip, centre, velocity, parameters, memory, contact, seal, stored)
-    _generalized(contact, centre, anchors, axes, slides, contact_arm, contact_cannula)
-    _generalized(seal, centre, anchors, axes, slides, seal_arm, seal_cannula)
-    return contact + seal
+@compiled
+def act(bore: Bore, world: World) -> None:
+    """Add contact and seal to the applied forces."""
+    push, applied = bore.acting, vector(world.qfrc_applied, world.nv)
+    fill_push(bore, world, push)
+    for i in range(push.contact_arm.size):
+        applied[world.first_dof + i] += push.contact_arm[i]
+        applied[world.first_dof + i] += push.seal_arm[i]
+    for i in range(3):
+        applied[bore.first_dof + i] += push.contact_cannula[i]
+        applied[bore.first_dof + i] += push.seal_cannula[i]
+
+
+@compiled
+def wall_force(bore: Bore, world: World, out: Array) -> None:
+    """Fill `out` (3,) [N] with the force of the shaft on the cannula now; nothing is remembered."""
+    for i in range(4):
+        bore.trial.memory[i] = bore.acting.memory[i]
+    fill_push(bore, world, bore.trial)
+    for i in range(3):
+        out[i] = bore.trial.force[i]
+
+
+@compiled
+def fill_push(bore: Bore, world: World, out: Push) -> None:
+    """Generalized forces of contact and seal, by the Jacobian's transpose; `out.memory` goes on."""
+    contact, seal, velocity = np.zeros(3), np.zeros(3), np.zeros(3)
+    centre = body_place(world, bore.cannula)
+    entry, tip = site_place(world, world.entry), site_place(world, world.tip)
+    _relative_velocity(bore, world, centre, velocity)
+    _forces(entry, tip, centre, velocity, bore.parameters, out.memory, contact, seal, out.stored)
+    _generalized(contact, bore, world, centre, out.contact_arm, out.contact_cannula)
+    _generalized(seal, bore, world, centre, out.seal_arm, out.seal_cannula)
+    for i in range(3):
+        out.force[i] = contact[i] + seal[i]
 
 
 @compiled
@@ -123,13 +194,13 @@ def _forces(
     seal[:] = 0.0
     stored[:] = 0.0
     along = tip - entry
-    length = np.sqrt(np.dot(along, along))
+    length = np.sqrt(dot(along, along))
     if length == 0.0:
         return
     u = along / length
-    s = np.dot(u, centre - entry)
+    s = dot(u, centre - entry)
     across = centre - entry - s * u
-    rho = np.sqrt(np.dot(across, across))
+    rho = np.sqrt(dot(across, across))
     slope = FUNNEL_SLOPE if s > length - FUNNEL_LENGTH_M else 0.0
     gap = parameters[0] + slope * (s - length + FUNNEL_LENGTH_M)
     _enter(s, length, rho - gap, memory)
@@ -161,7 +232,7 @@ def _press(
 ) -> None:
     """Contact at penetration p > 0."""
     k, b = parameters[1], parameters[2]
-    rate = np.dot(direction, velocity)
+    rate = dot(direction, velocity)
     contact[:] = -max(0.0, k * p + b * min(1.0, p / FADE_M) * rate) * direction
     stored[0] = 0.5 * k * p * p
 
@@ -173,30 +244,36 @@ def _rub(u: Array, velocity: Array, parameters: Array, memory: Array, seal: Arra
     reach = limit / stiffness
     z = min(max(memory[3], -reach), reach)
     memory[3] = z
-    pull = stiffness * z + damping * np.dot(u, velocity)
+    pull = stiffness * z + damping * dot(u, velocity)
     seal[:] = -min(max(pull, -limit), limit) * u
     stored[1] = 0.5 * stiffness * z * z
 
 
 @compiled
-def _relative_velocity(
-    centre: Array, anchors: Array, axes: Array, qvel: Array, slides: Array, slide_qvel: Array
-) -> Array:
+def _relative_velocity(bore: Bore, world: World, centre: Array, v: Array) -> None:
     """Velocity of the cannula relative to the shaft's point at its centre (3,) [m/s]."""
-    v = np.zeros(3)
+    axes, anchors = doubles(world.xaxis, world.njnt, 3), doubles(world.xanchor, world.njnt, 3)
+    qvel, arm, turned = vector(world.qvel, world.nv), np.empty(3), np.empty(3)
     for i in range(3):
-        v += slide_qvel[i] * slides[i]
-    for i in range(len(qvel)):
-        v -= qvel[i] * cross(axes[i], centre - anchors[i])
-    return v
+        for k in range(3):
+            v[k] += qvel[bore.first_dof + i] * axes[bore.first_slide + i, k]
+    for i in range(world.q.size):
+        for k in range(3):
+            arm[k] = centre[k] - anchors[world.first_joint + i, k]
+        cross(axes[world.first_joint + i], arm, turned)
+        for k in range(3):
+            v[k] -= qvel[world.first_dof + i] * turned[k]
 
 
 @compiled
-def _generalized(
-    force: Array, centre: Array, anchors: Array, axes: Array, slides: Array, arm: Array, cannula: Array
-) -> None:
-    """Fill `arm` (7,) and `cannula` (3,) with J^T of a force on the cannula and its reaction on the shaft."""
-    for i in range(len(arm)):
-        arm[i] = -np.dot(cross(axes[i], centre - anchors[i]), force)
+def _generalized(force: Array, bore: Bore, world: World, centre: Array, arm: Array, cannula: Array) -> None:
+    """Fill `arm` (n,) and `cannula` (3,) with J^T of a force on the cannula and its reaction on the shaft."""
+    axes, anchors = doubles(world.xaxis, world.njnt, 3), doubles(world.xanchor, world.njnt, 3)
+    lever, turned = np.empty(3), np.empty(3)
+    for i in range(arm.size):
+        for k in range(3):
+            lever[k] = centre[k] - anchors[world.first_joint + i, k]
+        cross(axes[world.first_joint + i], lever, turned)
+        arm[i] = -dot(turned, force)
     for i in range(3):
-        cannula[i] = np.dot(slides[i], force)
+        cannula[i] = dot(axes[bore.first_slide + i], force)

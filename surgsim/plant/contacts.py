@@ -1,32 +1,77 @@
 """Looks for contacts that must not be: of the arm with itself, with the patient and with the table."""
 
 import math
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
+from numba import types
 from numpy.typing import NDArray
 
 from surgsim.compiled import compiled
 from surgsim.models.build import Scene
 from surgsim.plant.truth import Contact
+from surgsim.tick.arrays import A1, A2, A3, I1, I2
 
 Array = NDArray[np.float64]
 Ids = NDArray[np.intp]
 
 SKIN_MARGIN_M = 0.1
 """How far from the port the shaft may pass the skin; nearer is the RCM limit's matter."""
-_NOTHING, _BODY, _TABLE, _SKIN = -9, -1, -2, -3
+NOTHING, _BODY, _TABLE, _SKIN = -9, -1, -2, -3
 _TERNARY_STEPS = 24
 
 
+class Watch(NamedTuple):
+    """What is watched, as arrays.
+
+    Attributes:
+        xpos: Body places (nbody, 3) [m].
+        xmat: Body orientations (nbody, 9).
+        bodies: The body that each capsule is fixed to (n,).
+        local: End points in the body's frame (n, 2, 3) [m].
+        radii: Of the capsules (n,) [m].
+        pairs: Capsules that can touch each other (m, 2).
+        shaft: The shaft's capsule, or -1 (1,).
+        patient: Rows of the patient's and the table's numbers, none without a port (5, 3).
+        ends: Filled with the end points, world frame (n, 2, 3) [m].
+    """
+
+    xpos: Array
+    xmat: Array
+    bodies: Ids
+    local: Array
+    radii: Array
+    pairs: Ids
+    shaft: Ids
+    patient: Array
+    ends: Array
+
+
+WATCH = types.NamedTuple([A2, A2, I1, A3, A1, I2, I1, A2, A3], Watch)
+
+
 class ContactWatch:
-    """Distances between the collision shapes where the bodies now are; nothing is pushed apart."""
+    """Distances between the collision shapes where the bodies now are; nothing is pushed apart.
+
+    Attributes:
+        arrays: What the kernel `forbidden_contact` works on.
+    """
 
     def __init__(self, scene: Scene, data: mujoco.MjData) -> None:
         s = scene.shapes
         self._names = s.names
-        self._where = (data.xpos, data.xmat, s.bodies, s.ends, s.radii, s.pairs, s.shaft, s.patient)
-        self._ends = np.empty_like(s.ends)
+        self.arrays = Watch(
+            xpos=data.xpos,
+            xmat=data.xmat,
+            bodies=np.array(s.bodies, dtype=np.int64),
+            local=np.array(s.ends, dtype=float),
+            radii=np.array(s.radii, dtype=float),
+            pairs=np.array(s.pairs, dtype=np.int64).reshape(-1, 2),
+            shaft=np.array([s.shaft], dtype=np.int64),
+            patient=np.array(s.patient, dtype=float).reshape(-1, 3),
+            ends=np.empty_like(s.ends),
+        )
 
     def look(self, p_WC: Array) -> Contact | None:
         """The first forbidden contact found, or None.
@@ -34,8 +79,8 @@ class ContactWatch:
         Args:
             p_WC: Port (3,) [m], which patient and table move with; not used without one.
         """
-        a, b, depth = _look(*self._where, p_WC, self._ends)
-        return None if b == _NOTHING else self._contact(a, b, 1e3 * depth)
+        a, b, depth = forbidden_contact(self.arrays, p_WC)
+        return None if b == NOTHING else self._contact(a, b, 1e3 * depth)
 
     def _contact(self, a: int, b: int, depth_mm: float) -> Contact:
         name = self._names[a]
@@ -48,19 +93,10 @@ class ContactWatch:
 
 
 @compiled
-def _look(
-    xpos: Array,
-    xmat: Array,
-    bodies: Ids,
-    local: Array,
-    radii: Array,
-    pairs: Ids,
-    shaft: int,
-    patient: Array,
-    p_WC: Array,
-    ends: Array,
-) -> tuple[int, int, float]:
-    """Capsule, what it touches and how deep [m]; `ends` is filled with the capsules' end points."""
+def forbidden_contact(watch: Watch, p_WC: Array) -> tuple[int, int, float]:
+    """Capsule, what it touches and how deep [m], for a port at `p_WC` (3,) [m]; `NOTHING` where all is well."""
+    xpos, xmat, bodies, local = watch.xpos, watch.xmat, watch.bodies, watch.local
+    radii, pairs, shaft, patient, ends = watch.radii, watch.pairs, watch.shaft[0], watch.patient, watch.ends
     for i in range(len(bodies)):
         p, R = xpos[bodies[i]], xmat[bodies[i]]
         for k in range(2):
@@ -74,7 +110,7 @@ def _look(
         if square < reach * reach:
             return i, j, reach - math.sqrt(square)
     if len(patient) == 0:
-        return 0, _NOTHING, 0.0
+        return 0, NOTHING, 0.0
     for i in range(2, len(bodies)):
         for k in range(2):
             x = ends[i, k, 0] - p_WC[0] - patient[0, 0]
@@ -93,7 +129,7 @@ def _look(
         beside = skin_distance(ends[shaft, 0], ends[shaft, 1], patient)
         if beside > SKIN_MARGIN_M:
             return shaft, _SKIN, beside
-    return 0, _NOTHING, 0.0
+    return 0, NOTHING, 0.0
 
 
 @compiled

@@ -1,27 +1,52 @@
 """Dynamic plant: MuJoCo's rigid-body dynamics under joint torques."""
 
+import math
 from collections.abc import Sequence
-from typing import Literal
+from typing import Any, Literal
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
 from surgsim.catalog import PartConfig
-from surgsim.columns import Block, scalar, vector
+from surgsim.columns import Block, scalar
+from surgsim.columns import vector as vector_columns
+from surgsim.compiled import as_parameter, compiled
 from surgsim.models.build import Scene
-from surgsim.plant.bystanders import Bystanders
+from surgsim.plant.bore import Bore, act, drag, wall_force
+from surgsim.plant.bystanders import joint_columns
 from surgsim.plant.contacts import ContactWatch
 from surgsim.plant.ledger import EnergyLedger
 from surgsim.plant.part import PlantPart
-from surgsim.plant.parts import PlantParts
 from surgsim.plant.port import Port
-from surgsim.plant.state import NO_FORCE, State
-from surgsim.plant.truth import NO_VALUES, NOWHERE, PointReader, Truth, arm_view
+from surgsim.plant.records import world_of
+from surgsim.plant.state import State
+from surgsim.plant.truth import NOWHERE, PointReader, Truth
+from surgsim.plant.world import (
+    ACTUATE,
+    AFTER_STEP,
+    BEFORE_STEP,
+    GRIP,
+    KINDS,
+    PORT_MOTION,
+    PUSH,
+    SENSE,
+    VALUES,
+    Hook,
+    Hooks,
+    HookTable,
+    advance_signature,
+    call_hooks,
+    hook_call,
+    measured,
+    overrides,
+)
+from surgsim.tick.arrays import World
+from surgsim.tick.mujoco_calls import mj_rnePostConstraint, mj_step1, mj_step2
+from surgsim.tick.status import GOES_ON
+from surgsim.tick.views import doubles, site_place, vector
 
 Array = NDArray[np.float64]
-_AT_REST = np.zeros(3)
-_AT_REST.flags.writeable = False
 
 
 class DynamicPlantConfig(PartConfig):
@@ -46,11 +71,130 @@ class DynamicPlantConfig(PartConfig):
         return DynamicPlant(scene, control_period_s, parts, seed, energy_ledger=self.energy_ledger)
 
 
+@compiled
+def clear_forces(world: World, bore: Bore, hooks: Hooks, functions: Any, t_s: float) -> int:
+    """Forces of the last step are forgotten, the port is moved to where it is at `t_s` [s]."""
+    world.step_s = t_s
+    if not world.disturbed:
+        return GOES_ON
+    vector(world.xfrc_applied, 6 * world.nbody)[:] = 0.0
+    vector(world.qfrc_applied, world.nv)[:] = 0.0
+    world.port_offset[:] = 0.0
+    world.port_velocity[:] = 0.0
+    status = call_hooks(PORT_MOTION, functions, hooks, world)
+    if world.mocap >= 0:
+        place = vector(world.mocap_pos + 24 * world.mocap, 3)
+        for i in range(3):
+            place[i] = world.port_home[i] + world.port_offset[i]
+    if world.walled:
+        drag(bore, world)
+    return status
+
+
+@compiled
+def look(world: World, bore: Bore, hooks: Hooks, functions: Any) -> int:
+    """Fill what is true and what is measured, after `mj_step1`."""
+    see_arm(world)
+    for i in range(3):
+        world.f_T_m[i] = world.f_T[i]
+    if world.walled:
+        wall_force(bore, world, world.f_C)
+    for i in range(world.q.size):
+        world.tau_m[i] = world.tau[i]
+    status = call_hooks(VALUES, functions, hooks, world)
+    return status if status != GOES_ON else call_hooks(SENSE, functions, hooks, world)
+
+
+@compiled
+def see_arm(world: World) -> None:
+    """Fill joints, tip, shaft and trocar, true and as measured without error."""
+    qpos, qvel = vector(world.qpos, world.nq), vector(world.qvel, world.nv)
+    for i in range(world.q.size):
+        world.q[i] = world.q_m[i] = qpos[world.first_qpos + i]
+        world.v[i] = world.v_m[i] = qvel[world.first_dof + i]
+    tip, wrist = site_place(world, world.tip), site_place(world, world.entry)
+    for i in range(3):
+        world.p_WT[i], world.p_WR[i] = tip[i], wrist[i]
+        world.p_WC[i] = math.nan if world.trocar < 0 else site_place(world, world.trocar)[i]
+        world.p_WC_m[i], world.v_WC_m[i] = world.p_WC[i], 0.0
+
+
+@compiled
+def begin(world: World, bore: Bore, hooks: Hooks, functions: Any) -> int:
+    """The first instant of a run: the arm at rest is held by the torques that it needs."""
+    status = clear_forces(world, bore, hooks, functions, 0.0)
+    mj_step1(world.model, world.data)
+    gravity = vector(world.qfrc_bias, world.nv)
+    for i in range(world.q.size):
+        world.tau[i] = gravity[world.first_dof + i]
+    return max(status, look(world, bore, hooks, functions))
+
+
+@compiled
+def advance_dynamics(world: World, bore: Bore, hooks: Hooks, functions: Any) -> int:
+    """Let `world.torque`, saturated at the limits, act for one control period."""
+    m, d, ctrl = world.model, world.data, vector(world.ctrl, world.first_ctrl + world.q.size)
+    for i in range(world.q.size):
+        world.torque[i] = min(max(world.torque[i], -world.tau_max[i]), world.tau_max[i])
+    status = call_hooks(ACTUATE, functions, hooks, world)
+    if status == GOES_ON:
+        status = call_hooks(GRIP, functions, hooks, world)
+    for i in range(world.q.size):
+        world.tau[i] = ctrl[world.first_ctrl + i] = world.torque[i]
+    start = world.tick * world.dt_s
+    for k in range(world.substeps):
+        t = start + k * world.timestep_s
+        if k > 0:
+            status = max(status, clear_forces(world, bore, hooks, functions, t))
+            mj_step1(m, d)
+        world.step_s = t
+        status = max(status, call_hooks(PUSH, functions, hooks, world))
+        if world.walled:
+            act(bore, world)
+        status = max(status, call_hooks(BEFORE_STEP, functions, hooks, world))
+        mj_step2(m, d)
+        status = max(status, call_hooks(AFTER_STEP, functions, hooks, world))
+    if world.touched and world.jaws >= 0:
+        mj_rnePostConstraint(m, d)
+        wrench = doubles(world.cfrc_ext, world.nbody, 6)[world.jaws]
+        for i in range(3):
+            world.f_T[i] = wrench[3 + i]
+    world.tick += 1
+    world.t_s = world.tick * world.dt_s
+    status = max(status, clear_forces(world, bore, hooks, functions, world.t_s))
+    mj_step1(m, d)
+    return max(status, look(world, bore, hooks, functions))
+
+
+@compiled
+def _own_values(gains: Array, world: World, memory: Array, out: Array) -> int:
+    """Forces on wall and tip, and the positions of the joints whose places in `qpos` are the gains."""
+    k = 0
+    if world.walled:
+        for i in range(3):
+            out[k + i] = world.f_C[i]
+        k += 3
+    if world.touched:
+        for i in range(3):
+            out[k + i] = world.f_T[i]
+        k += 3
+    qpos = vector(world.qpos, world.nq)
+    for i in range(gains.size):
+        out[k + i] = qpos[int(gains[i])]
+    return GOES_ON
+
+
 class DynamicPlant:
     """Steps MuJoCo once or more a control tick.
 
     `mj_step1`, control and other forces, `mj_step2`: the controller sees kinematics and velocities of the
-    present state, which a plain `mj_step` would leave one step old.
+    present state, which a plain `mj_step` would leave one step old. The period itself is the kernel
+    `advance_dynamics`; this builds its arrays, starts the parts and calls it.
+
+    Attributes:
+        world: The arrays of the plant.
+        bore: Those of the physical port.
+        advance: The kernel of a control period.
     """
 
     def __init__(
@@ -63,141 +207,149 @@ class DynamicPlant:
         energy_ledger: bool = False,
     ) -> None:
         self._scene = scene
-        self._model = scene.model
         self._data = mujoco.MjData(scene.model)
-        self._parts = PlantParts(parts, seed or np.random.SeedSequence(0))
-        self._qpos = arm_view(self._data.qpos, scene.qpos_ids)
-        self._qvel = arm_view(self._data.qvel, scene.dof_ids)
-        self._ctrl = arm_view(self._data.ctrl, scene.actuator_ids)
-        self._dt = control_period_s
-        self._timestep = scene.model.opt.timestep
-        self._substeps = round(control_period_s / self._timestep)
-        self._port = Port(scene, self._data)
+        self._parts = tuple(parts)
+        self._seed = seed or np.random.SeedSequence(0)
+        self._touched = any(part.touches_tip for part in parts)
+        has_wall = scene.wall is not None
+        self.world = world_of(
+            scene, self._data, control_period_s, disturbed=bool(parts) or has_wall, touched=self._touched
+        )
+        self._port = Port(scene, self._data, self.world)
+        self.bore = self._port.bore
+        signature = advance_signature(len(scene.dof_ids))
+        self._begin, self.advance = as_parameter(begin, signature), as_parameter(advance_dynamics, signature)
         self._ledger = EnergyLedger(scene, self._data, self._port) if energy_ledger else None
-        self._bystanders = Bystanders(scene, self._data)
-        self._has_wall = scene.wall is not None
-        self._disturbed = bool(parts) or self._has_wall
+        self._joint_columns, places = joint_columns(scene.model)
+        self._table = self._hooks(places)
         self._points = PointReader(scene, self._data)
         self._contacts = ContactWatch(scene, self._data)
-        self._tick = 0
-        self._tau = np.zeros(7)
-        self._f_T = NO_FORCE
-        self._adds_columns = bool(self.columns)
-        self._truth = self._look()
+
+    @property
+    def watch(self) -> ContactWatch:
+        """Looks for forbidden contacts."""
+        return self._contacts
+
+    @property
+    def hooks(self) -> HookTable:
+        """The hooks of the parts."""
+        return self._table
 
     @property
     def columns(self) -> tuple[Block, ...]:
         """What the plant adds to the trace."""
         ledger = () if self._ledger is None else EnergyLedger.COLUMNS
         energies = tuple(scalar(f"energy_{term}", "j") for term in ledger)
-        wall = (vector("trocar_force", "n"),) if self._has_wall else ()
-        tip = (vector("tip_force", "n"),) if self._parts.touch_tip else ()
-        return (*wall, *tip, *self._bystanders.columns, *energies, *self._parts.columns)
+        wall = (vector_columns("trocar_force", "n"),) if self._scene.wall is not None else ()
+        tip = (vector_columns("tip_force", "n"),) if self._touched else ()
+        parts = tuple(block for part in self._parts if _records(part) for block in part.columns)
+        return (*wall, *tip, *self._joint_columns, *energies, *parts)
+
+    def _hooks(self, places: NDArray[np.intp]) -> HookTable:
+        """Own columns, the ledger and all parts, in this order."""
+        own = 3 * (self._scene.wall is not None) + 3 * self._touched + len(places)
+        none = np.zeros(0)
+        arrays = [(places.astype(float), none, own), (none, none, 0 if self._ledger is None else 10)]
+        hooks = [Hook(kind=VALUES, part=0, rank=0, function=_own_values)]
+        if self._ledger is not None:
+            hooks += [
+                Hook(kind=BEFORE_STEP, part=1, rank=0, function=self._ledger.before_step),
+                Hook(kind=AFTER_STEP, part=1, rank=0, function=self._ledger.after_step),
+                Hook(kind=VALUES, part=1, rank=0, function=lambda: self._record(1, self._ledger_terms())),
+            ]
+        for number, part in enumerate(self._parts, 2):
+            width = sum(len(block.columns) for block in part.columns) if _records(part) else 0
+            arrays.append((part.gains, part.memory, width))
+            hooks += self._hooks_of(part, number)
+        return HookTable(hooks, arrays, len(self._scene.dof_ids))
+
+    def _hooks_of(self, part: PlantPart, number: int) -> list[Hook]:
+        found = []
+        for kind, name in enumerate(KINDS):
+            kernel = part.kernels.get(name)
+            if kernel is None and kind not in (BEFORE_STEP, AFTER_STEP) and overrides(part, name):
+                kernel = hook_call(
+                    part, kind, self._scene, self._data, self.world, lambda n=number: self._own_slice(n)
+                )
+            if kernel is not None:
+                found.append(Hook(kind=kind, part=number, rank=part.rank, function=kernel))
+        return found
+
+    def _ledger_terms(self) -> Array:
+        assert self._ledger is not None
+        return self._ledger.terms()
+
+    def _record(self, part: int, values: Array) -> None:
+        self._own_slice(part)[:] = values
+
+    def _own_slice(self, part: int) -> Array:
+        """The columns of a part in the plant's values."""
+        return self._table.values_of(part)
 
     def reset(self, q: Array) -> State:
-        """Put the arm at rest at joint positions `q` (7,) [rad], held so far by the torques that it needs."""
-        mujoco.mj_resetData(self._model, self._data)
-        self._qpos[:] = q
-        self._tick = 0
-        self._tau = np.zeros(7)
-        self._f_T = NO_FORCE
-        self._parts.start(self._scene, self._data, self._dt)
+        """Put the arm at rest at joint positions `q` (n,) [rad], held so far by the torques that it needs."""
+        model, data, world = self._scene.model, self._data, self.world
+        mujoco.mj_resetData(model, data)
+        data.qpos[self._scene.qpos_ids] = q
+        world.tick, world.t_s = 0, 0.0
+        world.f_T[:] = 0.0
+        self._start_parts()
         self._port.reset()
-        self._clear_forces(0.0)
-        mujoco.mj_step1(self._model, self._data)
-        self._tau = arm_view(self._data.qfrc_bias, self._scene.dof_ids).copy()
         if self._ledger is not None:
             self._ledger.start()
-        return self._state()
+        self._told(self._begin(world, self.bore, self._table.arrays, self._table.functions))
+        return self.state()
+
+    def _start_parts(self) -> None:
+        """Parts forget the last run; the same seed draws the same again."""
+        seed = np.random.SeedSequence(self._seed.entropy, spawn_key=self._seed.spawn_key)
+        for part, child in zip(self._parts, seed.spawn(len(self._parts)), strict=True):
+            part.start(self._scene, self._data, np.random.default_rng(child), float(self.world.dt_s))
+        self._table.fill()
 
     def step(self, torque: Array, qdot: Array, jaw: float = 0.0) -> State:
-        """Let `torque` (7,) [N m], saturated at the limits, act for one control period.
+        """Let `torque` (n,) [N m], saturated at the limits, act for one control period.
 
         Args:
             torque: Commanded torque.
             qdot: Not used: the resolver's velocities are for a kinematic plant.
             jaw: How far the instrument's jaws are told to close, from 0 (open) to 1.
         """
-        limit = self._scene.limits.torque
-        torque = np.minimum(np.maximum(torque, -limit), limit)
-        if self._disturbed:
-            torque = self._parts.actuate(torque)
-            self._parts.grip(jaw)
-        self._tau = torque
-        self._ctrl[:] = torque
-        start = self._tick * self._dt
-        for i in range(self._substeps):
-            if i > 0:
-                self._clear_forces(start + i * self._timestep)
-                mujoco.mj_step1(self._model, self._data)
-            self._advance(start + i * self._timestep)
-        if self._parts.touch_tip:
-            self._f_T = self._bystanders.force_on_tip()
-        self._tick += 1
-        self._clear_forces(self._tick * self._dt)
-        mujoco.mj_step1(self._model, self._data)
-        return self._state()
+        self.world.torque[:], self.world.qdot[:], self.world.jaw = torque, qdot, jaw
+        self.refill()
+        self._told(self.advance(self.world, self.bore, self._table.arrays, self._table.functions))
+        return self.state()
+
+    def refill(self) -> None:
+        """Let the parts draw what they need for the coming ticks; to be called every `BLOCK_TICKS`."""
+
+    def state(self) -> State:
+        """A copy of what is measured now."""
+        return measured(self.world)
 
     def truth(self) -> Truth:
         """Where things really are now."""
-        return self._truth
-
-    def _clear_forces(self, t_s: float) -> None:
-        """Forces of the last step are forgotten, the port is moved to where it is at `t_s`."""
-        if self._disturbed:
-            self._data.xfrc_applied[:] = 0.0
-            self._data.qfrc_applied[:] = 0.0
-            motion = self._parts.port_motion(t_s)
-            self._port.move(motion.offset, motion.velocity)
-
-    def _advance(self, t_s: float) -> None:
-        """From `mj_step1` at `t_s` to the end of the step."""
-        if self._disturbed:
-            self._parts.push(t_s, self._scene, self._data)
-            self._port.act()
-        if self._ledger is not None:
-            self._ledger.before_step()
-        mujoco.mj_step2(self._model, self._data)
-        if self._ledger is not None:
-            self._ledger.after_step()
-
-    def _look(self) -> Truth:
         p_WT, p_WR, p_WC = self._points.read()
-        f_C = self._port.force() if self._has_wall else NOWHERE
-        touched = self._parts.touch_tip
+        world = self.world
         return Truth(
-            q=self._qpos.copy(),
-            v=self._qvel.copy(),
+            q=world.q.copy(),
+            v=world.v.copy(),
             p_WT=p_WT,
             p_WR=p_WR,
             p_WC=p_WC,
-            f_C=f_C,
-            f_T=self._f_T if touched else NOWHERE,
+            f_C=world.f_C.copy() if self._scene.wall is not None else NOWHERE,
+            f_T=world.f_T.copy() if self._touched else NOWHERE,
             contact=self._contacts.look(p_WC),
-            values=self._values(f_C) if self._adds_columns else NO_VALUES,
+            values=self._table.arrays.values.copy(),
         )
 
-    def _values(self, f_C: Array) -> Array:
-        """Values of `columns` now."""
-        return np.concatenate(
-            (
-                f_C if self._has_wall else NO_VALUES,
-                self._f_T if self._parts.touch_tip else NO_VALUES,
-                self._bystanders.values(),
-                NO_VALUES if self._ledger is None else self._ledger.terms(),
-                self._parts.values(),
-            )
-        )
+    def _told(self, status: int) -> None:
+        """Raise what a part in Python raised."""
+        if status != GOES_ON:
+            error = self._table.raised()
+            assert error is not None, f"a part of the plant stopped with status {status}"
+            raise error
 
-    def _state(self) -> State:
-        truth = self._truth = self._look()
-        state = State(
-            t_s=self._tick * self._dt,
-            q=truth.q,
-            v=truth.v,
-            tau=self._tau,
-            p_WC=truth.p_WC,
-            v_WC=_AT_REST,
-            f_T=self._f_T,
-        )
-        return self._parts.sense(state) if self._disturbed else state
+
+def _records(part: PlantPart) -> bool:
+    return "values" in part.kernels or overrides(part, "values")

@@ -1,7 +1,7 @@
 """Kinematic plant: perfect velocity tracking, the setting of the manipulability paper."""
 
 from collections.abc import Sequence
-from typing import Literal
+from typing import Any, Literal
 
 import mujoco
 import numpy as np
@@ -9,11 +9,20 @@ from numpy.typing import NDArray
 
 from surgsim.catalog import PartConfig
 from surgsim.columns import Block
+from surgsim.compiled import as_parameter, compiled
 from surgsim.models.build import Scene
+from surgsim.plant.bore import Bore
 from surgsim.plant.contacts import ContactWatch
+from surgsim.plant.dynamic import see_arm
 from surgsim.plant.part import PlantPart
+from surgsim.plant.records import world_of
 from surgsim.plant.state import State
 from surgsim.plant.truth import PointReader, Truth
+from surgsim.plant.world import Hooks, HookTable, advance_signature, measured
+from surgsim.tick.arrays import World, new
+from surgsim.tick.mujoco_calls import mj_kinematics
+from surgsim.tick.status import GOES_ON
+from surgsim.tick.views import vector
 
 Array = NDArray[np.float64]
 
@@ -35,44 +44,72 @@ class KinematicPlantConfig(PartConfig):
         return KinematicPlant(scene, control_period_s)
 
 
+@compiled
+def look_at_kinematics(world: World) -> None:
+    """Place the model and fill what is true and measured."""
+    mj_kinematics(world.model, world.data)
+    see_arm(world)
+
+
+@compiled
+def advance_kinematics(world: World, bore: Bore, hooks: Hooks, functions: Any) -> int:
+    """q(k+1) = q(k) + T q'(k), eq. (5) of the manipulability paper; torque and jaws do nothing."""
+    qpos, qvel = vector(world.qpos, world.nq), vector(world.qvel, world.nv)
+    world.tick += 1
+    world.t_s = world.tick * world.dt_s
+    for i in range(world.q.size):
+        qpos[world.first_qpos + i] += world.dt_s * world.qdot[i]
+        qvel[world.first_dof + i] = world.qdot[i]
+    look_at_kinematics(world)
+    return GOES_ON
+
+
 class KinematicPlant:
-    """q(k+1) = q(k) + T q'(k), eq. (5) of the manipulability paper."""
+    """Follows the resolver's joint velocities exactly.
+
+    Attributes:
+        world: The arrays of the plant.
+        bore: There is no physical port.
+        advance: The kernel of a control period.
+    """
 
     columns: tuple[Block, ...] = ()
 
     def __init__(self, scene: Scene, control_period_s: float) -> None:
         self._scene = scene
         self._data = mujoco.MjData(scene.model)
-        self._dt = control_period_s
-        self._tick = 0
-        self._v = np.zeros(7)
+        n = len(scene.dof_ids)
+        self.world, self.bore = world_of(scene, self._data, control_period_s), new(Bore, n)
+        self.hooks = HookTable((), (), n)
+        self.advance = as_parameter(advance_kinematics, advance_signature(n))
         self._points = PointReader(scene, self._data)
-        self._contacts = ContactWatch(scene, self._data)
+        self.watch = ContactWatch(scene, self._data)
 
     def reset(self, q: Array) -> State:
-        """Put the arm at rest at joint positions `q` (7,) [rad]."""
+        """Put the arm at rest at joint positions `q` (n,) [rad]."""
         mujoco.mj_resetData(self._scene.model, self._data)
-        self._tick = 0
-        return self._place(q, np.zeros(7))
+        self.world.tick, self.world.t_s = 0, 0.0
+        self._data.qpos[self._scene.qpos_ids] = q
+        look_at_kinematics(self.world)
+        return self.state()
 
     def step(self, torque: Array, qdot: Array, jaw: float = 0.0) -> State:
-        """Move with velocity `qdot` (7,) [rad/s] for one control period; torque and jaws do nothing."""
-        q = self._data.qpos[self._scene.qpos_ids] + self._dt * qdot
-        self._tick += 1
-        return self._place(q, qdot)
+        """Move with velocity `qdot` (n,) [rad/s] for one control period; torque and jaws do nothing."""
+        self.world.qdot[:] = qdot
+        self.advance(self.world, self.bore, self.hooks.arrays, self.hooks.functions)
+        return self.state()
+
+    def refill(self) -> None:
+        """There is nothing to draw."""
+
+    def state(self) -> State:
+        """A copy of what is measured now."""
+        return measured(self.world)
 
     def truth(self) -> Truth:
         """Where things are now."""
         p_WT, p_WR, p_WC = self._points.read()
-        q = np.array(self._data.qpos[self._scene.qpos_ids])
-        contact = self._contacts.look(p_WC)
-        return Truth(q=q, v=self._v, p_WT=p_WT, p_WR=p_WR, p_WC=p_WC, contact=contact)
-
-    def _place(self, q: Array, v: Array) -> State:
-        self._data.qpos[self._scene.qpos_ids] = q
-        self._v = v.copy()
-        mujoco.mj_kinematics(self._scene.model, self._data)
-        now = self.truth()
-        return State(
-            t_s=self._tick * self._dt, q=now.q, v=now.v, tau=np.zeros(7), p_WC=now.p_WC, v_WC=np.zeros(3)
+        contact = self.watch.look(p_WC)
+        return Truth(
+            q=self.world.q.copy(), v=self.world.v.copy(), p_WT=p_WT, p_WR=p_WR, p_WC=p_WC, contact=contact
         )

@@ -1,6 +1,8 @@
 """Interface of what a scenario adds to the plant: disturbances and props."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -36,11 +38,18 @@ class PlantPart:
         columns: What it adds to the trace.
         touches_tip: Whether it can press on the instrument's tip, so that the force there is measured.
         rank: Where it stands in the chains of `actuate` and `sense`: lower first, then as in the scenario.
+        kernels: Compiled hooks by name, which stand for the methods of that name:
+            status = hook(gains, world, memory, out), with the time in `world.time` and `out` for `values`.
+        gains: Their numbers, taken over after `start`.
+        memory: Their memory at the beginning of a run, taken over after `start`.
     """
 
     columns: tuple[Block, ...] = ()
     touches_tip: bool = False
     rank: int = 0
+    kernels: Mapping[str, Any] = {}
+    gains: Array = np.zeros(0)
+    memory: Array = np.zeros(0)
 
     def modify(self, spec: mujoco.MjSpec) -> None:
         """Change the model before it is compiled."""

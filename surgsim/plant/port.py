@@ -5,14 +5,17 @@ The wall's spring and damper are those of the cannula's joints, which MuJoCo kno
 Why it is not one of MuJoCo's own contacts, and figures, are in docs/physical_port.md.
 """
 
+from typing import Any
+
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
 from surgsim.models.build import Scene
 from surgsim.models.config import WallConfig
-from surgsim.plant.bore import act, law
-from surgsim.plant.truth import arm_view
+from surgsim.plant.bore import Bore, Push, act, drag, law, wall_force
+from surgsim.plant.records import world_of
+from surgsim.tick.arrays import new
 
 Array = NDArray[np.float64]
 _INSIDE = 1  # in the bore's memory
@@ -22,26 +25,34 @@ class Port:
     """Moves the port's place of rest and, with a wall, applies its forces.
 
     Order in a step: zero `qfrc_applied`, `move`, `mj_step1`, `act`, `mj_step2`; `act`, `force` and `position`
-    read the positions that `mj_step1` (or `mj_kinematics`) leaves.
+    read the positions that `mj_step1` (or `mj_kinematics`) leaves. The plant's kernel does the same on the
+    records.
+
+    Attributes:
+        bore: The record of the bore's law; not used without a wall.
+        wall: The wall's forces, or None.
     """
 
-    def __init__(self, scene: Scene, data: mujoco.MjData) -> None:
+    def __init__(self, scene: Scene, data: mujoco.MjData, world: Any = None) -> None:
         self._data = data
         self._row = scene.port_mocap
-        self._home = np.zeros(3) if self._row is None else np.array(data.mocap_pos[self._row])
-        self.wall = None if scene.wall is None else WallForces(scene, scene.wall, data)
+        self._world = world_of(scene, data, float(scene.model.opt.timestep)) if world is None else world
+        self.bore = new(Bore, len(scene.dof_ids))
+        self.wall = (
+            None if scene.wall is None else WallForces(scene, scene.wall, data, self._world, self.bore)
+        )
 
     def reset(self) -> None:
         """Put the place of rest where it is configured and forget the last run; `qpos` is the plant's."""
         if self._row is not None:
-            self._data.mocap_pos[self._row] = self._home
+            self._data.mocap_pos[self._row] = self._world.port_home
         if self.wall is not None:
             self.wall.reset()
 
     def move(self, offset: Array, velocity: Array) -> None:
         """Put the place of rest `offset` (3,) [m] from the configured one, at `velocity` (3,) [m/s]."""
         if self._row is not None:
-            self._data.mocap_pos[self._row] = self._home + offset
+            self._data.mocap_pos[self._row] = self._world.port_home + offset
         if self.wall is not None:
             self.wall.drag(offset, velocity)
 
@@ -60,7 +71,8 @@ class Port:
 
     def rest(self) -> Array:
         """Place of rest of the port (3,) [m], world frame."""
-        return self._home.copy() if self._row is None else np.array(self._data.mocap_pos[self._row])
+        home: Array = self._world.port_home.copy()
+        return home if self._row is None else np.array(self._data.mocap_pos[self._row])
 
 
 class WallForces:
@@ -68,85 +80,96 @@ class WallForces:
 
     Attributes:
         dofs: Where the cannula is in `qvel`.
-        stiffness: Of the cannula's joints (3,) [N/m].
-        damping: Of the cannula's joints (3,) [N s/m].
-        offset: Displacement of the place of rest in the port's frame (3,) [m].
-        velocity: Its velocity (3,) [m/s].
-        drive: Generalized force of the wall's motion (nv,).
-        contact: Contact's generalized force at the last `act` (nv,).
-        seal: Seal's generalized force at the last `act` (nv,).
-        stored: Elastic energy in contact and in the seal at the last `act` (2,) [J].
+        bore: The record of the law.
     """
 
-    def __init__(self, scene: Scene, wall: WallConfig, data: mujoco.MjData) -> None:
+    def __init__(self, scene: Scene, wall: WallConfig, data: mujoco.MjData, world: Any, bore: Any) -> None:
         model, cannula = scene.model, scene.cannula_dof_ids
-        self._data = data
-        self._body = int(model.dof_bodyid[cannula[0]])
-        self._frame = _rotation(model.body_quat[self._body])
-        self.dofs = _span(cannula)
-        self.stiffness = np.array(model.jnt_stiffness[_span(model.dof_jntid[cannula])])
-        self.damping = np.array(model.dof_damping[self.dofs])
-        self.offset, self.velocity, self.stored = np.zeros(3), np.zeros(3), np.zeros(2)
-        self.drive, self.contact, self.seal = np.zeros(model.nv), np.zeros(model.nv), np.zeros(model.nv)
-        arm, own = _span(scene.dof_ids), self.dofs
-        self._state = _views(scene, data)
-        self._law = law(wall, scene.clearance_m)
-        self._memory, self._trial = np.zeros(4), np.zeros(4)
-        self._parts = (self.contact[arm], self.contact[own], self.seal[arm], self.seal[own], self.stored)
-        self._unused = (np.zeros(7), np.zeros(3), np.zeros(7), np.zeros(3), np.zeros(2))
+        self._data, self._world, self.bore = data, world, bore
+        self.dofs, self._arm, self._nv = _span(cannula), _span(scene.dof_ids), model.nv
+        slides = _span(model.dof_jntid[cannula])
+        bore.cannula = int(model.dof_bodyid[cannula[0]])
+        bore.first_slide, bore.first_dof = slides.start, self.dofs.start
+        bore.parameters[:] = law(wall, scene.clearance_m)
+        bore.frame[:] = _rotation(model.body_quat[bore.cannula])
+        bore.stiffness[:] = np.array(model.jnt_stiffness[slides]).reshape(3, -1)[:, 0]
+        bore.damping[:] = np.array(model.dof_damping[self.dofs]).reshape(3, -1)[:, 0]
+
+    @property
+    def stiffness(self) -> Array:
+        """Of the cannula's joints (3,) [N/m]."""
+        return np.array(self.bore.stiffness)
+
+    @property
+    def damping(self) -> Array:
+        """Of the cannula's joints (3,) [N s/m]."""
+        return np.array(self.bore.damping)
+
+    @property
+    def offset(self) -> Array:
+        """Displacement of the place of rest in the port's frame (3,) [m]."""
+        return np.array(self.bore.offset)
+
+    @property
+    def velocity(self) -> Array:
+        """Its velocity (3,) [m/s]."""
+        return np.array(self.bore.velocity)
+
+    @property
+    def stored(self) -> Array:
+        """Elastic energy in contact and in the seal at the last `act` (2,) [J]."""
+        return np.array(self.bore.acting.stored)
+
+    @property
+    def drive(self) -> Array:
+        """Generalized force of the wall's motion (nv,)."""
+        return self._generalized(np.zeros(self._arm.stop - self._arm.start), self.bore.drive)
+
+    @property
+    def contact(self) -> Array:
+        """Contact's generalized force at the last `act` (nv,)."""
+        return self._generalized(self.bore.acting.contact_arm, self.bore.acting.contact_cannula)
+
+    @property
+    def seal(self) -> Array:
+        """Seal's generalized force at the last `act` (nv,)."""
+        return self._generalized(self.bore.acting.seal_arm, self.bore.acting.seal_cannula)
+
+    def _generalized(self, arm: Array, cannula: Array) -> Array:
+        out = np.zeros(self._nv)
+        out[self._arm], out[self.dofs] = arm, cannula
+        return out
 
     def reset(self) -> None:
         """Forget the seal's stretch, whether the shaft is in, and all forces."""
-        for array in (self.offset, self.velocity, self.stored, self.drive, self.contact, self.seal):
-            array[:] = 0.0
-        self._memory[:] = 0.0
+        bore = self.bore
+        bore.offset[:] = bore.velocity[:] = bore.drive[:] = 0.0
+        for name in Push.SHAPES:
+            getattr(bore.acting, name)[:] = 0.0
 
     @property
     def engaged(self) -> bool:
         """Whether the shaft was in the bore at the last `act`."""
-        return bool(self._memory[_INSIDE])
+        return bool(self.bore.acting.memory[_INSIDE])
 
     def drag(self, offset: Array, velocity: Array) -> None:
         """Refer the wall's spring and damper to a moved place of rest, by `qfrc_applied`."""
-        np.dot(offset, self._frame, out=self.offset)
-        np.dot(velocity, self._frame, out=self.velocity)
-        pull = self.stiffness * self.offset + self.damping * self.velocity
-        self.drive[self.dofs] = pull
-        self._data.qfrc_applied[self.dofs] += pull
+        self._world.port_offset[:], self._world.port_velocity[:] = offset, velocity
+        drag(self.bore, self._world)
 
     def act(self) -> None:
         """Add contact and seal to `qfrc_applied`."""
-        act(*self._state, self._law, self._memory, *self._parts)
-        applied = self._data.qfrc_applied
-        applied += self.contact
-        applied += self.seal
+        act(self.bore, self._world)
 
     def force(self) -> Array:
         """Force of the shaft on the cannula at the present state (3,) [N]; nothing is remembered."""
-        self._trial[:] = self._memory
-        return act(*self._state, self._law, self._trial, *self._unused)
+        out = np.zeros(3)
+        wall_force(self.bore, self._world, out)
+        return out
 
     def position(self) -> Array:
         """Centre of the cannula (3,) [m]."""
-        return np.array(self._data.xpos[self._body])
-
-
-def _views(
-    scene: Scene, data: mujoco.MjData
-) -> tuple[Array, Array, Array, Array, Array, Array, Array, Array]:
-    """What `act` reads, not copied: entry, tip, cannula, axes of arm and cannula, and their velocities."""
-    model, cannula = scene.model, scene.cannula_dof_ids
-    hinges, slides = _span(model.dof_jntid[scene.dof_ids]), _span(model.dof_jntid[cannula])
-    return (
-        data.site_xpos[scene.shaft_entry_site],
-        data.site_xpos[scene.tip_site],
-        data.xpos[int(model.dof_bodyid[cannula[0]])],
-        data.xanchor[hinges],
-        data.xaxis[hinges],
-        data.xaxis[slides],
-        arm_view(data.qvel, scene.dof_ids),
-        arm_view(data.qvel, cannula),
-    )
+        return np.array(self._data.xpos[self.bore.cannula])
 
 
 def _rotation(quat: Array) -> Array:

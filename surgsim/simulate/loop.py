@@ -2,31 +2,50 @@
 
 import math
 from collections.abc import Callable
-from dataclasses import replace
-from time import perf_counter
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from surgsim.columns import joints
-from surgsim.compiled import compiled
-from surgsim.control.controller import ControlOutput
-from surgsim.control.problem import ControlFailure
+from surgsim.columns import joints, width
+from surgsim.compiled import as_parameter
 from surgsim.errors import Outcome
 from surgsim.plant.state import State
+from surgsim.plant.world import BLOCK_TICKS
 from surgsim.scenario.schema import Scenario, StopConfig
 from surgsim.simulate.rows import Rows
-from surgsim.simulate.safety import SafetyMonitor
+from surgsim.simulate.safety import SafetyMonitor, is_safe
 from surgsim.simulate.setup import Setup, prepare
-from surgsim.simulate.stop import StopLaw
-from surgsim.tasks.base import Feedback, TipCommand
+from surgsim.simulate.stop import new_stop
+from surgsim.simulate.ticks import (
+    DONE,
+    FAILED,
+    GOING,
+    NOT_FINITE,
+    PLANT_TOLD,
+    ROW_BLOCKS,
+    TASK_TOLD,
+    UNSAFE,
+    Run,
+    Tables,
+    ask_signature,
+    ask_task,
+    hold_signature,
+    hold_ticks,
+    run_signature,
+    run_ticks,
+)
+from surgsim.tasks.base import TipCommand
+from surgsim.tasks.binding import BoundTask
+from surgsim.tasks.command import command_of
+from surgsim.tick.arrays import new
+from surgsim.tick.status import GOES_ON
 from surgsim.trace.trace import BASE_BLOCKS, Ending, Trace, TraceMeta
 
 Array = NDArray[np.float64]
 Progress = Callable[[float, float], None]
 """Called now and then with the simulated time reached and the whole duration [s]."""
 
-_PROGRESS_TICKS = 250
 _NO_STOP = StopConfig(duration_s=0.0)
 
 
@@ -40,42 +59,66 @@ def simulate(scenario: Scenario, progress: Progress | None = None) -> Trace:
 
 
 class Simulation:
-    """One run of a prepared scenario, stepped by `tick`, or by `run` to its end and the stop after it.
+    """One run of a prepared scenario, by `tick`, or by `run` to its end and the stop after it.
 
-    Every row of the trace holds the state at a tick, the command for it, and the torque commanded from it.
+    The ticks themselves are the compiled function `run_ticks`; this builds its arrays and enters it for a few
+    hundred ticks at a time. Every row of the trace holds the state at a tick, the command for it, and the
+    torque commanded from it.
     """
 
     def __init__(self, setup: Setup) -> None:
         self._setup = setup
-        scenario = setup.scenario
+        scenario, plant = setup.scenario, setup.plant
         self._period = scenario.simulation.control_period_s
-        self._ticks = math.ceil(setup.task.duration_s / self._period - 1e-6)
-        self._torque_limit = setup.scene.limits.torque
         wall = setup.scene.wall
         tear = math.inf if wall is None else wall.tear_force_n
         self._safety = SafetyMonitor(scenario.safety, setup.scene.limits, scenario.trocar is not None, tear)
-        self._stop = StopLaw(scenario.safety.stop or StopConfig(), setup.arm)
         self._stop_ticks = round((scenario.safety.stop or _NO_STOP).duration_s / self._period)
-        self._infeasible = 0
+        last = math.ceil(setup.task.duration_s / self._period - 1e-6)
         groups = {
             "terms": tuple(joints(f"tau_{term}_", "nm") for term in setup.controller.terms),
             "task": setup.task.columns,
             "controller": setup.controller.columns,
-            "plant": setup.plant.columns,
+            "plant": plant.columns,
         }
-        self._rows = Rows(BASE_BLOCKS, groups, self._ticks + 1 + self._stop_ticks)
-        self._uses_torque = scenario.plant.uses_torque
-        self._state: State = setup.plant.reset(setup.q_start)
+        self._rows = Rows(BASE_BLOCKS, groups, last + 1 + self._stop_ticks)
+        self._task = BoundTask(setup.task, setup.controller.control.command)
+        n = setup.arm.limits.q_min.size
+        self._stop = new_stop(scenario.safety.stop or StopConfig(), setup.arm)
+        self._run, self._tables = self._wire(last)
+        self._run_ticks = as_parameter(run_ticks, run_signature(n))
+        self._hold_ticks = as_parameter(hold_ticks, hold_signature(n))
+        self._ask_task = as_parameter(ask_task, ask_signature(n))
+        self._ending: Ending | None = None
+        plant.reset(setup.q_start)
         setup.controller.reset()
         setup.task.reset()
-        self._count = 0
-        self._ending: Ending | None = None
-        self._command = self._ask()
+        self._ask()
+
+    def _wire(self, last: int) -> tuple[Any, Tables]:
+        """The record and the tables of the run."""
+        setup, scenario, plant = self._setup, self._setup.scenario, self._setup.plant
+        run = new(Run, 0)
+        p, controller = run.progress, setup.controller
+        p.last, p.most_infeasible = last, scenario.safety.infeasible_ticks_max
+        p.reacts, p.uses_torque = setup.task.reacts, scenario.plant.uses_torque
+        p.shares_port, p.task_values = controller.estimates, width(setup.task.columns)
+        p.resolver_values = width(controller.columns) - 3 * controller.estimates
+        self._task.told = run.feedback
+        return run, Tables(
+            rows=self._rows.data,
+            at=self._rows.begins(*ROW_BLOCKS),
+            task_gains=self._task.gains,
+            task_memory=self._task.memory,
+            watch=plant.watch.arrays,
+            hooks=plant.hooks.arrays,
+            minds=controller.minds,
+        )
 
     @property
     def time_s(self) -> float:
         """Simulated time reached [s]."""
-        return self._count * self._period
+        return float(self._setup.plant.world.t_s)
 
     @property
     def ended(self) -> bool:
@@ -89,125 +132,108 @@ class Simulation:
 
     @property
     def state(self) -> State:
-        """The plant's state at the present tick."""
-        return self._state
+        """The plant's state at the present tick, as it is measured."""
+        state: State = self._setup.plant.state()
+        return state
 
     @property
     def command(self) -> TipCommand:
         """The task's command at the present tick."""
-        return self._command
+        return command_of(self._setup.controller.control.command)
 
     @property
     def due(self) -> bool:
         """Whether the next tick ends the run whatever the controller does: time is up, or a limit passed."""
-        return self._is_last or self._check() is not None
+        world, command = self._setup.plant.world, self._setup.controller.control.command
+        over = world.tick >= self._run.progress.last or command.finished
+        return bool(over) or not is_safe(self._safety.guard, self._tables.watch, world, command)
 
     def run(self, progress: Progress | None = None) -> Trace:
         """Tick to the end; if that is an outcome that stops the arm, stop it and hold it for a while."""
         duration = self._setup.task.duration_s
         while not self.ended:
-            self.tick()
-            if progress is not None and self._count % _PROGRESS_TICKS == 0:
+            self._advance_by(BLOCK_TICKS - int(self._setup.plant.world.tick) % BLOCK_TICKS)
+            if progress is not None:
                 progress(self.time_s, duration)
         self._hold()
         return self.trace()
 
     def tick(self) -> None:
         """One control period: look, decide, record, act. Does nothing once ended."""
-        if self.ended:
-            return
-        setup, state, command = self._setup, self._state, self._command
-        row = self._rows.add(state.t_s, setup.plant.truth(), command)
-        row[self._rows.group["task"]] = setup.task.values()
-        self._ending = self._check()
-        if self.ended:
-            return
-        if command.rcm_shift is not None and command.rcm_shift_rate is not None:
-            centre, rate = state.p_WC + command.rcm_shift, state.v_WC + command.rcm_shift_rate
-            state = replace(state, p_WC=centre, v_WC=rate)
-        began = perf_counter()
-        try:
-            output = setup.controller.tick(state, command)
-        except ControlFailure as failure:
-            self._fail(row, failure)
-            return
-        self._infeasible = 0
-        self._stop.release()
-        self._record(row, output, perf_counter() - began)
-        if not math.isfinite(output.torque @ output.torque):
-            self._ending = Ending(outcome=Outcome.DIVERGED, t_s=state.t_s, detail="torque is not finite")
-            return
-        if self._is_last:
-            self._ending = Ending(outcome=Outcome.COMPLETED, t_s=state.t_s)
-            return
-        self._act(output.torque, output.resolution.qdot)
-        self._command = self._ask()
+        if not self.ended:
+            self._advance_by(1)
 
-    def _act(self, torque: Array, qdot: Array) -> None:
-        self._state = self._setup.plant.step(torque, qdot, self._command.jaw)
-        self._count += 1
+    def _advance_by(self, ticks: int) -> None:
+        plant, controller = self._setup.plant, self._setup.controller
+        plant.refill()
+        self._run_ticks(
+            ticks,
+            self._run,
+            self._tables,
+            controller.control,
+            plant.world,
+            plant.bore,
+            self._safety.guard,
+            self._stop,
+            self._task.kernel,
+            *controller.kernels,
+            plant.advance,
+            plant.hooks.functions,
+        )
+        if self._run.progress.reason != GOING:
+            self._ending = self._end(int(self._run.progress.reason))
 
-    def _fail(self, row: Array, failure: ControlFailure) -> None:
-        """The controller has no answer: brake for this tick, or end the run."""
-        infeasible = failure.outcome is Outcome.INFEASIBLE
-        self._infeasible += infeasible
-        row[self._rows.at["infeasible"]] = float(infeasible)
-        most = self._setup.scenario.safety.infeasible_ticks_max
-        if not infeasible or self._infeasible > most or self._is_last:
-            self._ending = Ending(
-                outcome=failure.outcome, t_s=self._state.t_s, detail=failure.detail, data=failure.data
-            )
-            return
-        self._brake(row)
-        self._command = self._ask()
-
-    def _brake(self, row: Array) -> None:
-        """One period of the stop's motion, in the controller's place."""
-        self._setup.controller.reset()  # what it remembers is not what the arm did
-        motion = self._stop.tick(self._state)
-        row[self._rows.at["qdot_ref"]] = motion.qdot
-        row[self._rows.at["q_ref"]] = motion.q
-        if self._uses_torque:
-            self._record_torque(row, motion.torque)
-        self._act(motion.torque, motion.qdot)
+    def _end(self, reason: int) -> Ending:
+        """How the run ended; what a part in Python raised is raised here."""
+        t_s = self.time_s
+        if reason == UNSAFE:
+            ending = self._safety.check(t_s, self._setup.plant.truth(), self.command)
+            assert ending is not None, "a limit was passed, and none was found"
+            return ending
+        if reason == FAILED:
+            failure = self._setup.controller.failure(int(self._run.progress.status))
+            return Ending(outcome=failure.outcome, t_s=t_s, detail=failure.detail, data=failure.data)
+        if reason == NOT_FINITE:
+            return Ending(outcome=Outcome.DIVERGED, t_s=t_s, detail="torque is not finite")
+        if reason == DONE:
+            return Ending(outcome=Outcome.COMPLETED, t_s=t_s)
+        error = self._task.raised() or self._setup.plant.hooks.raised()
+        assert error is not None, f"the loop came back with {reason} and no error"
+        raise error
 
     def _hold(self) -> None:
         """The stop after the outcome: rows without a command, for its time or until the state diverges."""
-        if self._ending is None or self._ending.outcome is Outcome.COMPLETED or not self._uses_torque:
+        if self._ending is None or self._ending.outcome is Outcome.COMPLETED:
             return
-        row: Array | None = None
-        for _ in range(self._stop_ticks):
-            if not math.isfinite(self._state.q @ self._state.q + self._state.v @ self._state.v):
+        if not self._run.progress.uses_torque:
+            return
+        left = self._stop_ticks
+        while left > 0:
+            ticks = min(left, BLOCK_TICKS - int(self._setup.plant.world.tick) % BLOCK_TICKS)
+            self._setup.plant.refill()
+            plant = self._setup.plant
+            done = self._hold_ticks(
+                ticks,
+                self._run,
+                self._tables,
+                self._setup.controller.control,
+                plant.world,
+                plant.bore,
+                self._stop,
+                plant.advance,
+                plant.hooks.functions,
+            )
+            if self._run.progress.reason == PLANT_TOLD:
+                self._end(PLANT_TOLD)
+            if done < ticks:
                 return
-            motion = self._stop.tick(self._state)
-            if row is not None:
-                self._record_torque(row, motion.torque)
-            self._act(motion.torque, motion.qdot)
-            row = self._rows.add(self._state.t_s, self._setup.plant.truth(), None)
-            row[self._rows.at["stopped"]] = 1.0
-            row[self._rows.at["q_ref"]] = motion.q
+            left -= ticks
 
-    @property
-    def _is_last(self) -> bool:
-        return self._count >= self._ticks or self._setup.task.finished(self._state.t_s)
-
-    def _check(self) -> Ending | None:
-        return self._safety.check(self._state.t_s, self._setup.plant.truth(), self._command)
-
-    def _ask(self) -> TipCommand:
-        """The task's command for the present state, once a tick."""
-        setup, state = self._setup, self._state
-        if not setup.task.reacts:
-            return setup.task.command(state.t_s)
-        kin = setup.arm.kinematics(state.q)
-        feedback = Feedback(
-            p_WT=kin.p_WT,
-            v_WT=kin.Jv_WT @ state.v,
-            R_WT=kin.R_WT,
-            w_WT=kin.Jw_WT @ state.v,
-            f_T=state.f_T,
-        )
-        return setup.task.command(state.t_s, feedback)
+    def _ask(self) -> None:
+        """The task's command for the present state."""
+        c, world = self._setup.controller.control, self._setup.plant.world
+        if self._ask_task(self._run, self._tables, c, world, self._task.kernel) != GOES_ON:
+            self._end(TASK_TOLD)
 
     def trace(self) -> Trace:
         """The trace so far, with its derived columns."""
@@ -222,30 +248,4 @@ class Simulation:
             },
             ending=ending,
         )
-        return self._rows.finish(meta, self._setup.arm)
-
-    def _record(self, row: Array, output: ControlOutput, took: float) -> None:
-        at, group = self._rows.at, self._rows.group
-        row[at["qdot_ref"]] = output.resolution.qdot
-        row[at["q_ref"]] = output.q_ref
-        row[at["resolver_residual"]] = output.resolution.residual
-        row[at["control_time"]] = took
-        row[group["controller"]] = output.values
-        if self._uses_torque:
-            self._record_torque(row, output.torque)
-            row[group["terms"]] = output.terms.ravel()
-
-    def _record_torque(self, row: Array, torque: Array) -> None:
-        inside, count = _saturate(torque, self._torque_limit)
-        row[self._rows.at["tau"]] = inside
-        row[self._rows.at["saturated_joints"]] = count
-
-
-@compiled
-def _saturate(torque: Array, limit: Array) -> tuple[Array, int]:
-    """`torque` cut at `limit`, and how many joints were cut."""
-    inside, count = np.empty(7), 0
-    for i in range(7):
-        inside[i] = min(max(torque[i], -limit[i]), limit[i])
-        count += inside[i] != torque[i]
-    return inside, count
+        return self._rows.finish(int(self._run.progress.rows), meta, self._setup.arm)

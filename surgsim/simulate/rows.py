@@ -6,8 +6,6 @@ from numpy.typing import NDArray
 from surgsim.columns import Block
 from surgsim.control.manipulability import manipulability_series
 from surgsim.models.arm import ArmModel
-from surgsim.plant.truth import Truth
-from surgsim.tasks.base import TipCommand
 from surgsim.trace.trace import Trace, TraceMeta
 
 Array = NDArray[np.float64]
@@ -20,7 +18,12 @@ class Rows:
     Args:
         base: Blocks of every trace.
         groups: Further blocks by who writes them, each group side by side in a row.
-        rows: Most rows that can be added.
+        rows: Most rows that can be written.
+
+    Attributes:
+        at: Where the columns of a block are in a row.
+        group: Where those of a group are.
+        data: The rows.
     """
 
     def __init__(self, base: Group, groups: dict[str, Group], rows: int) -> None:
@@ -36,29 +39,16 @@ class Rows:
             last = first + sum(len(block.columns) for block in group)
             self.group[name] = slice(first, last)
             first = last
-        self._data = np.full((rows, width), np.nan)
-        self._count = 0
+        self.data = np.full((rows, width), np.nan)
 
-    def add(self, t_s: float, truth: Truth, command: TipCommand | None) -> Array:
-        """Begin the next row with what is known of every tick, also of one that ends the run or follows."""
-        at = self.at
-        row: Array = self._data[self._count]
-        self._count += 1
-        row[at["t"]] = t_s
-        row[at["q"]] = truth.q
-        row[at["v"]] = truth.v
-        row[at["tip"]] = truth.p_WT
-        if command is not None:
-            row[at["tip_ref"]] = command.p_WTd
-        row[at["wrist"]] = truth.p_WR
-        row[at["trocar"]] = truth.p_WC
-        row[at["infeasible"]] = row[at["stopped"]] = 0.0
-        row[self.group["plant"]] = truth.values
-        return row
+    def begins(self, *names: str) -> NDArray[np.int64]:
+        """Where blocks and groups begin in a row."""
+        places = {**self.at, **self.group}
+        return np.array([places[name].start for name in names], dtype=np.int64)
 
-    def finish(self, meta: TraceMeta, arm: ArmModel) -> Trace:
-        """The rows written so far with the derived columns, as a trace."""
-        data, at = self._data[: self._count].copy(), self.at
+    def finish(self, count: int, meta: TraceMeta, arm: ArmModel) -> Trace:
+        """The first `count` rows with the derived columns, as a trace."""
+        data, at = self.data[:count].copy(), self.at
         tip, wrist, trocar = data[:, at["tip"]], data[:, at["wrist"]], data[:, at["trocar"]]
         data[:, at["tip_error"]] = np.linalg.norm(tip - data[:, at["tip_ref"]], axis=1, keepdims=True)
         axis = (tip - wrist) / np.linalg.norm(tip - wrist, axis=1, keepdims=True)

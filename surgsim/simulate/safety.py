@@ -1,6 +1,7 @@
 """Ends a run within one tick of a limit being passed."""
 
 import math
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,15 +9,47 @@ from numpy.typing import NDArray
 from surgsim.compiled import compiled
 from surgsim.errors import Outcome
 from surgsim.models.build import JointLimits
+from surgsim.plant.contacts import NOTHING, Watch, forbidden_contact
 from surgsim.plant.truth import Truth
 from surgsim.scenario.schema import SafetyConfig
 from surgsim.spatial import shaft_distance
 from surgsim.tasks.base import TipCommand
+from surgsim.tick.algebra import norm
+from surgsim.tick.arrays import Command, Record, World, new
 from surgsim.trace.trace import Ending
 
 Array = NDArray[np.float64]
 _POSITION_SLACK_RAD = 1e-9
 _VELOCITY_SLACK = 1e-9
+
+
+class Guard(Record):
+    """The limits as a record.
+
+    Attributes:
+        position: Whether joint ranges are checked.
+        velocity: Whether joint velocities are checked.
+        contact: Whether forbidden contacts are checked.
+        rcm_m: Largest RCM error [m].
+        tip_m: Largest tip error [m].
+        wall_n: Largest force on the wall [N].
+        touch_n: Largest force on the tip [N].
+        q_min: Joint range (n,) [rad].
+        q_max: Joint range (n,) [rad].
+        v_max: Joint velocity limits (n,) [rad/s].
+    """
+
+    SHAPES: ClassVar[dict[str, str]] = {"q_min": "n", "q_max": "n", "v_max": "n"}
+    position: int
+    velocity: int
+    contact: int
+    rcm_m: float
+    tip_m: float
+    wall_n: float
+    touch_n: float
+    q_min: Array
+    q_max: Array
+    v_max: Array
 
 
 class SafetyMonitor:
@@ -27,6 +60,9 @@ class SafetyMonitor:
         limits: Limits of the joints.
         has_trocar: Whether an RCM error is defined.
         tear_force_n: Force past which the incision tears [N]; infinite without a physical wall.
+
+    Attributes:
+        guard: The limits as arrays, for `is_safe`; `check` says which one was passed.
     """
 
     def __init__(
@@ -39,32 +75,16 @@ class SafetyMonitor:
         self._trocar_force = math.inf if config.trocar_force_max_n is None else config.trocar_force_max_n
         self._tip_force = math.inf if config.tip_force_max_n is None else config.tip_force_max_n
 
+        self.guard = guard = new(Guard, limits.q_min.size)
+        guard.position, guard.velocity = config.stop_at_joint_limit, config.stop_at_velocity_limit
+        guard.contact = config.stop_at_collision
+        guard.rcm_m = _or_infinite(config.rcm_error_max_m) if has_trocar else math.inf
+        guard.tip_m = _or_infinite(config.tip_error_max_m)
+        guard.wall_n, guard.touch_n = min(self._tear, self._trocar_force), self._tip_force
+        guard.q_min[:], guard.q_max[:], guard.v_max[:] = limits.q_min, limits.q_max, limits.velocity
+
     def check(self, t_s: float, truth: Truth, command: TipCommand) -> Ending | None:
         """Why the run must end at `t_s` [s], or None."""
-        rcm, tip = self._c.rcm_error_max_m, self._c.tip_error_max_m
-        limits = self._limits
-        safe = _is_safe(
-            truth.q,
-            truth.v,
-            limits.q_min,
-            limits.q_max,
-            limits.velocity,
-            self._c.stop_at_joint_limit,
-            self._c.stop_at_velocity_limit,
-            truth.p_WT,
-            truth.p_WR,
-            truth.p_WC if self._has_trocar else truth.p_WT,
-            command.p_WTd,
-            math.inf if rcm is None else rcm,
-            math.inf if tip is None else tip,
-            truth.f_C,
-            min(self._tear, self._trocar_force),
-            truth.f_T,
-            self._tip_force,
-        )
-        touching = self._c.stop_at_collision and truth.contact is not None
-        if safe and not touching:
-            return None
         return (
             self._joint_ending(t_s, truth)
             or self._contact_ending(t_s, truth)
@@ -124,38 +144,29 @@ class SafetyMonitor:
         return None
 
 
+def _or_infinite(limit: float | None) -> float:
+    return math.inf if limit is None else limit
+
+
 @compiled
-def _is_safe(
-    q: Array,
-    v: Array,
-    q_min: Array,
-    q_max: Array,
-    v_max: Array,
-    check_q: bool,
-    check_v: bool,
-    p_T: Array,
-    p_R: Array,
-    p_C: Array,
-    p_Td: Array,
-    rcm_max: float,
-    tip_max: float,
-    f_C: Array,
-    f_C_max: float,
-    f_T: Array,
-    f_T_max: float,
-) -> bool:
+def is_safe(guard: Guard, watch: Watch, world: World, command: Command) -> bool:
     """Whether no limit is passed; NaN is not safe, but a force that is NaN is not there."""
-    for i in range(7):
-        if not (math.isfinite(q[i]) and math.isfinite(v[i])):
+    for i in range(world.q.size):
+        q, v = world.q[i], world.v[i]
+        if not (math.isfinite(q) and math.isfinite(v)):
             return False
-        if check_q and (q[i] < q_min[i] - _POSITION_SLACK_RAD or q[i] > q_max[i] + _POSITION_SLACK_RAD):
+        outside = q < guard.q_min[i] - _POSITION_SLACK_RAD or q > guard.q_max[i] + _POSITION_SLACK_RAD
+        if guard.position and outside:
             return False
-        if check_v and abs(v[i]) > v_max[i] * (1.0 + _VELOCITY_SLACK):
+        if guard.velocity and abs(v) > guard.v_max[i] * (1.0 + _VELOCITY_SLACK):
             return False
-    a, b, e = p_T - p_R, p_C - p_T, p_T - p_Td
-    x, y, z = a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
-    rcm = math.sqrt((x * x + y * y + z * z) / (a[0] * a[0] + a[1] * a[1] + a[2] * a[2]))
-    tip = math.sqrt(e[0] * e[0] + e[1] * e[1] + e[2] * e[2])
-    wall = math.sqrt(f_C[0] * f_C[0] + f_C[1] * f_C[1] + f_C[2] * f_C[2])
-    touch = math.sqrt(f_T[0] * f_T[0] + f_T[1] * f_T[1] + f_T[2] * f_T[2])
-    return rcm <= rcm_max and tip <= tip_max and not (wall > f_C_max or touch > f_T_max)
+    square = 0.0
+    for i in range(3):
+        square += (world.p_WT[i] - command.p_WTd[i]) * (world.p_WT[i] - command.p_WTd[i])
+    if not math.sqrt(square) <= guard.tip_m:
+        return False
+    if guard.rcm_m < math.inf and not shaft_distance(world.p_WC, world.p_WT, world.p_WR) <= guard.rcm_m:
+        return False
+    if norm(world.f_C) > guard.wall_n or norm(world.f_T) > guard.touch_n:
+        return False
+    return not guard.contact or forbidden_contact(watch, world.p_WC)[1] == NOTHING

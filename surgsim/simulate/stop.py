@@ -5,35 +5,72 @@ category 2 brakes and holds under power. This is category 2: an arm without brak
 falls, and its instrument is in a patient.
 """
 
-from dataclasses import dataclass
+import math
+from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from surgsim.compiled import compiled
 from surgsim.models.arm import ArmModel
-from surgsim.plant.state import State
 from surgsim.scenario.schema import StopConfig
+from surgsim.tick.algebra import times
+from surgsim.tick.arrays import Array, Model, Record, World, new
+from surgsim.tick.nominal import dynamics, kinematics
 
-Array = NDArray[np.float64]
 _LEAST_TORQUE_NM = 1.0
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class StopMotion:
-    """What the stop asks of the joints at a tick.
+class Stop(Record):
+    """A stop: its law's numbers, its memory, and the motion that it asks for.
 
     Attributes:
-        q: Positions (7,) [rad].
-        qdot: Velocities (7,) [rad/s].
-        torque: (7,) [N m].
+        stiffness: w^2 [1/s^2].
+        share: Of the torque limits that may brake.
+        begun: Whether it has begun.
+        begun_s: When [s].
+        length_s: How long it takes [s].
+        q_begun: Joint positions then (n,) [rad].
+        v_begun: Joint velocities then (n,) [rad/s].
+        q: Joint positions asked for (n,) [rad].
+        qdot: Joint velocities asked for (n,) [rad/s].
+        torque: (n,) [N m].
+        q_min: Joint range (n,) [rad].
+        q_max: Joint range (n,) [rad].
+        tau_max: Torque limits (n,) [N m].
+        nominal: The nominal model.
     """
 
+    SHAPES: ClassVar[dict[str, str]] = {
+        name: "n" for name in ("q_begun", "v_begun", "q", "qdot", "torque", "q_min", "q_max", "tau_max")
+    }
+    stiffness: float
+    share: float
+    begun: int
+    begun_s: float
+    length_s: float
+    q_begun: Array
+    v_begun: Array
     q: Array
     qdot: Array
     torque: Array
+    q_min: Array
+    q_max: Array
+    tau_max: Array
+    nominal: Model
 
 
-class StopLaw:
+def new_stop(config: StopConfig, arm: ArmModel) -> Any:
+    """A stop that has not begun; `arm` must outlive it."""
+    limits = arm.limits
+    stop = new(Stop, limits.q_min.size)
+    stop.stiffness, stop.share = config.stiffness_per_s2, config.torque_share
+    stop.q_min[:], stop.q_max[:], stop.tau_max[:] = limits.q_min, limits.q_max, limits.torque
+    arm.point(stop.nominal)
+    return stop
+
+
+@compiled
+def brake(stop: Stop, world: World) -> None:
     """Joint impedance about a motion that comes to rest with limited deceleration.
 
         tau = M(q) (q_s'' + 2 w (q_s' - q') + w^2 (q_s - q)) + bias(q, q'),  w^2 = stiffness
@@ -41,37 +78,31 @@ class StopLaw:
     from the measured state and the nominal model alone. The stopping motion goes on along the joint velocity
     of its first tick, all joints in step: q_s' falls linearly to zero within T = max_i |M q'|_i / (share
     (t_i - |bias_i|)), with the torque limits t; a joint that comes to its position limit stays there.
+
+    The first call after `stop.begun` is zero begins the stop.
     """
-
-    def __init__(self, config: StopConfig, arm: ArmModel) -> None:
-        self._c = config
-        self._arm = arm
-        self.release()
-
-    def release(self) -> None:
-        """Forget the stop: the next tick begins another."""
-        self._begun: State | None = None
-        self._length_s = 0.0
-
-    def tick(self, state: State) -> StopMotion:
-        """What to do at `state`; the first call after `release` begins the stop."""
-        dyn = self._arm.dynamics(state.q, state.v)
-        if self._begun is None:
-            self._begun = state
-            free = np.maximum(self._arm.limits.torque - np.abs(dyn.bias), _LEAST_TORQUE_NM)
-            needed = np.abs(dyn.mass_matrix @ state.v) / (self._c.torque_share * free)
-            self._length_s = max(float(needed.max()), 1e-9)
-        q, v, a = self._motion(state.t_s - self._begun.t_s, self._begun)
-        w = np.sqrt(self._c.stiffness_per_s2)
-        wanted = a + 2.0 * w * (v - state.v) + w * w * (q - state.q)
-        return StopMotion(q=q, qdot=v, torque=dyn.mass_matrix @ wanted + dyn.bias)
-
-    def _motion(self, t: float, begun: State) -> tuple[Array, Array, Array]:
-        """Position, velocity and acceleration (7,) of the stopping motion `t` [s] after it began."""
-        T, t = self._length_s, min(t, self._length_s)
-        left = 1.0 - t / T
-        limits = self._arm.limits
-        free = begun.q + begun.v * (0.5 * T * (1.0 - left * left))
-        q = np.minimum(np.maximum(free, limits.q_min), limits.q_max)
-        v = np.where(q == free, begun.v, 0.0)
-        return q, v * left, -v / T if left > 0.0 else np.zeros(7)
+    n, M, bias = world.q_m.size, stop.nominal.M, stop.nominal.bias
+    kinematics(stop.nominal, world.q_m)
+    dynamics(stop.nominal, world.v_m)
+    wanted = np.empty(n)
+    if not stop.begun:
+        times(M, world.v_m, wanted)
+        length = 1e-9
+        for i in range(n):
+            free = max(stop.tau_max[i] - abs(bias[i]), _LEAST_TORQUE_NM)
+            length = max(length, abs(wanted[i]) / (stop.share * free))
+            stop.q_begun[i], stop.v_begun[i] = world.q_m[i], world.v_m[i]
+        stop.begun, stop.begun_s, stop.length_s = 1, world.t_s, length
+    length = stop.length_s
+    left = 1.0 - min(world.t_s - stop.begun_s, length) / length
+    w = math.sqrt(stop.stiffness)
+    for i in range(n):
+        free = stop.q_begun[i] + stop.v_begun[i] * (0.5 * length * (1.0 - left * left))
+        stop.q[i] = min(max(free, stop.q_min[i]), stop.q_max[i])
+        moving = stop.v_begun[i] if stop.q[i] == free else 0.0
+        stop.qdot[i] = moving * left
+        a = -moving / length if left > 0.0 else 0.0
+        wanted[i] = a + 2.0 * w * (stop.qdot[i] - world.v_m[i]) + w * w * (stop.q[i] - world.q_m[i])
+    times(M, wanted, stop.torque)
+    for i in range(n):
+        stop.torque[i] += bias[i]

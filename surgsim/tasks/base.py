@@ -1,8 +1,9 @@
 """What a task asks of the instrument, and the part that all path tasks share."""
 
 from abc import ABC, abstractmethod
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Annotated, Protocol, Self
+from typing import Annotated, Any, ClassVar, Protocol, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,9 +11,12 @@ from pydantic import Field, NonNegativeFloat, PositiveFloat, model_validator
 
 from surgsim.catalog import PartConfig
 from surgsim.columns import Block
+from surgsim.compiled import compiled
 from surgsim.models.config import Vec3
 from surgsim.spatial import plane_axes
 from surgsim.tasks.profile import Profile
+from surgsim.tick.arrays import Command
+from surgsim.tick.blank import new_command, new_feedback
 
 Array = NDArray[np.float64]
 _REACH_SAMPLES = 200
@@ -164,6 +168,8 @@ class PathTaskConfig(PartConfig, ABC):
         hold_end_s: Time at rest after it [s].
     """
 
+    kernel: ClassVar[Any]
+
     start_m: Vec3 | None = None
     normal: Vec3 = (0.0, 0.0, 1.0)
     direction: Vec3 = (1.0, 0.0, 0.0)
@@ -179,9 +185,17 @@ class PathTaskConfig(PartConfig, ABC):
         plane_axes(np.array(self.normal), np.array(self.direction))
         return self
 
+    @property
     @abstractmethod
+    def path(self) -> tuple[Any, tuple[float, ...]]:
+        """The kernel of the path and its numbers; see `PathKernel`."""
+
     def shape(self, s: float) -> Array:
         """Rows point [m], first and second derivative by s (3, 3), in path axes, from the origin at s = 0."""
+        kernel, numbers = self.path
+        rows = np.zeros((3, 3))
+        kernel(np.array(numbers), float(s), rows)
+        return rows
 
     def build(
         self, start: Array, period_s: float = 0.001, seed: np.random.SeedSequence | None = None
@@ -197,14 +211,42 @@ class PathTaskConfig(PartConfig, ABC):
         return PathTask(shape=self, profile=profile, start=np.array(start), R_WP=np.column_stack(axes))
 
 
+PathKernel = Callable[[Array, float, Array], None]
+"""path(numbers, s, rows): fills point [m], first and second derivative by s (3, 3), from the origin at s = 0."""
+HOLD, DURATION, RAMP, START, ROTATION, NUMBERS = 0, 1, 2, 3, 6, 15
+"""Where the gains of a path task begin: times [s], start (3,) [m], R_PW (3, 3), the path's own numbers."""
+
+
+@compiled
+def follow(gains: Array, rows: Array, s_dot: float, s_ddot: float, out: Command) -> None:
+    """Fill the command of a path whose `rows` are point and derivatives: p(s), p' s', p'' s'^2 + p' s''."""
+    for i in range(3):
+        p = dp = ddp = 0.0
+        for k in range(3):
+            turn = gains[ROTATION + 3 * k + i]
+            p += rows[0, k] * turn
+            dp += rows[1, k] * turn
+            ddp += rows[2, k] * turn
+        out.p_WTd[i] = gains[START + i] + p
+        out.v_WTd[i] = dp * s_dot
+        out.a_WTd[i] = ddp * (s_dot * s_dot) + dp * s_ddot
+
+
 class PathTask(TimedTask):
-    """A path shape followed with a smooth profile."""
+    """A path followed with a smooth profile; its law is a kernel of the path's own file.
+
+    Attributes:
+        kernel: status = kernel(gains, feedback, memory, out).
+        gains: Its numbers, see `HOLD` and the following.
+    """
 
     def __init__(self, *, shape: PathTaskConfig, profile: Profile, start: Array, R_WP: Array) -> None:
-        self._shape = shape
         self._profile = profile
-        self._start = start
-        self._R_PW = R_WP.T.copy()
+        self.kernel = shape.kernel
+        times = (profile.hold_start_s, profile.duration_s, profile.ramp_s)
+        self.gains = np.array([*times, *start, *R_WP.T.ravel(), *shape.path[1]])
+        self._out = new_command()
+        self._feedback = new_feedback()
 
     @property
     def duration_s(self) -> float:
@@ -213,13 +255,11 @@ class PathTask(TimedTask):
 
     def command(self, t_s: float, feedback: Feedback | None = None) -> TipCommand:
         """Desired tip motion at `t_s` [s]: p(s), p' s', p'' s'^2 + p' s''."""
-        s, s_dot, s_ddot = self._profile.progress(t_s)
-        p, dp, ddp = self._shape.shape(s) @ self._R_PW
-        return TipCommand(
-            p_WTd=self._start + p,
-            v_WTd=dp * s_dot,
-            a_WTd=ddp * (s_dot * s_dot) + dp * s_ddot,
-        )
+        self._feedback.t_s = t_s
+        self.kernel(self.gains, self._feedback, _NO_MEMORY, self._out)
+        out = self._out
+        return TipCommand(p_WTd=out.p_WTd.copy(), v_WTd=out.v_WTd.copy(), a_WTd=out.a_WTd.copy())
 
 
+_NO_MEMORY = np.zeros(0)
 Turns = Annotated[float, Field(gt=0.0, le=100.0)]

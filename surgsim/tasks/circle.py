@@ -1,12 +1,37 @@
 """Circle: a circular cut, e.g. around a tumour."""
 
 import math
-from typing import Literal
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 from pydantic import PositiveFloat
 
-from surgsim.tasks.base import Array, PathTaskConfig, Turns
+from surgsim.compiled import compiled
+from surgsim.tasks.base import DURATION, HOLD, NUMBERS, RAMP, Array, PathTaskConfig, Turns, follow
+from surgsim.tasks.profile import progress
+from surgsim.tick.arrays import Command, Feedback
+from surgsim.tick.status import GOES_ON
+
+
+@compiled
+def circle_path(numbers: Array, s: float, rows: Array) -> None:
+    """Rows point and derivatives (3, 3) in path axes."""
+    R, w = numbers[0], 2.0 * math.pi * numbers[1]
+    c, n = R * math.cos(w * s), R * math.sin(w * s)
+    rows[:] = 0.0
+    rows[0, 0], rows[0, 1] = c - R, n
+    rows[1, 0], rows[1, 1] = -w * n, w * c
+    rows[2, 0], rows[2, 1] = -w * w * c, -w * w * n
+
+
+@compiled
+def circle(gains: Array, feedback: Feedback, memory: Array, out: Command) -> int:
+    """The path followed with the profile's progress."""
+    s, s_dot, s_ddot = progress(gains[HOLD], gains[DURATION], gains[RAMP], feedback.t_s)
+    rows = np.empty((3, 3))
+    circle_path(gains[NUMBERS:], s, rows)
+    follow(gains, rows, s_dot, s_ddot, out)
+    return GOES_ON
 
 
 class CircleConfig(PathTaskConfig):
@@ -16,12 +41,13 @@ class CircleConfig(PathTaskConfig):
     paper.
     """
 
+    kernel: ClassVar[Any] = staticmethod(circle)
+
     type: Literal["circle"] = "circle"
     radius_m: PositiveFloat = 0.02
     turns: Turns = 1.0
 
-    def shape(self, s: float) -> Array:
-        """Rows point and derivatives (3, 3) in path axes."""
-        w, R = 2.0 * math.pi * self.turns, self.radius_m
-        c, n = R * math.cos(w * s), R * math.sin(w * s)
-        return np.array([[c - R, n, 0.0], [-w * n, w * c, 0.0], [-w * w * c, -w * w * n, 0.0]])
+    @property
+    def path(self) -> tuple[Any, tuple[float, ...]]:
+        """The kernel of the path and its numbers."""
+        return circle_path, (self.radius_m, self.turns)

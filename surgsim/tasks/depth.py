@@ -1,12 +1,37 @@
 """Depth: the instrument goes in and out while its tip circles."""
 
 import math
-from typing import Literal
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 from pydantic import NonNegativeFloat, PositiveFloat
 
-from surgsim.tasks.base import Array, PathTaskConfig, Turns
+from surgsim.compiled import compiled
+from surgsim.tasks.base import DURATION, HOLD, NUMBERS, RAMP, Array, PathTaskConfig, Turns, follow
+from surgsim.tasks.profile import progress
+from surgsim.tick.arrays import Command, Feedback
+from surgsim.tick.status import GOES_ON
+
+
+@compiled
+def depth_path(numbers: Array, s: float, rows: Array) -> None:
+    """Rows point and derivatives (3, 3) in path axes."""
+    R, w, D, u = numbers[0], 2.0 * math.pi * numbers[1], 0.5 * numbers[2], 2.0 * math.pi * numbers[3]
+    c, n = R * math.cos(w * s), R * math.sin(w * s)
+    d, m = D * math.cos(u * s), D * math.sin(u * s)
+    rows[0, 0], rows[0, 1], rows[0, 2] = c - R, n, D - d
+    rows[1, 0], rows[1, 1], rows[1, 2] = -w * n, w * c, u * m
+    rows[2, 0], rows[2, 1], rows[2, 2] = -w * w * c, -w * w * n, u * u * d
+
+
+@compiled
+def depth(gains: Array, feedback: Feedback, memory: Array, out: Command) -> int:
+    """The path followed with the profile's progress."""
+    s, s_dot, s_ddot = progress(gains[HOLD], gains[DURATION], gains[RAMP], feedback.t_s)
+    rows = np.empty((3, 3))
+    depth_path(gains[NUMBERS:], s, rows)
+    follow(gains, rows, s_dot, s_ddot, out)
+    return GOES_ON
 
 
 class DepthConfig(PathTaskConfig):
@@ -17,20 +42,15 @@ class DepthConfig(PathTaskConfig):
     tip. Dimensions are assumed.
     """
 
+    kernel: ClassVar[Any] = staticmethod(depth)
+
     type: Literal["depth"] = "depth"
     radius_m: NonNegativeFloat = 0.01
     turns: Turns = 2.0
     depth_m: PositiveFloat = 0.06
     strokes: Turns = 2.0
 
-    def shape(self, s: float) -> Array:
-        """Rows point and derivatives (3, 3) in path axes."""
-        w, u, R, D = (
-            2.0 * math.pi * self.turns,
-            2.0 * math.pi * self.strokes,
-            self.radius_m,
-            0.5 * self.depth_m,
-        )
-        c, n = R * math.cos(w * s), R * math.sin(w * s)
-        d, m = D * math.cos(u * s), D * math.sin(u * s)
-        return np.array([[c - R, n, D - d], [-w * n, w * c, u * m], [-w * w * c, -w * w * n, u * u * d]])
+    @property
+    def path(self) -> tuple[Any, tuple[float, ...]]:
+        """The kernel of the path and its numbers."""
+        return depth_path, (self.radius_m, self.turns, self.depth_m, self.strokes)

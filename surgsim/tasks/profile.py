@@ -6,6 +6,8 @@ and everything starts and ends at zero velocity and acceleration.
 
 from dataclasses import dataclass
 
+from surgsim.compiled import compiled
+
 
 @dataclass(frozen=True, kw_only=True)
 class Profile:
@@ -30,22 +32,38 @@ class Profile:
 
     def progress(self, t_s: float) -> tuple[float, float, float]:
         """Progress (s, s', s'') at time `t_s` [-, 1/s, 1/s^2]."""
-        t = t_s - self.hold_start_s
-        if t <= 0.0:
-            return 0.0, 0.0, 0.0
-        if t >= self.duration_s:
-            return 1.0, 0.0, 0.0
-        speed = 1.0 / (self.duration_s - self.ramp_s)
-        late = t > 0.5 * self.duration_s
-        x, v, a = self._speeding_up(self.duration_s - t if late else t)
-        if late:
-            return 1.0 - speed * x, speed * v, -speed * a
-        return speed * x, speed * v, speed * a
+        found: tuple[float, float, float] = progress(
+            self.hold_start_s, self.duration_s, self.ramp_s, float(t_s)
+        )
+        return found
 
-    def _speeding_up(self, t: float) -> tuple[float, float, float]:
-        """Distance, speed and acceleration after `t` from rest, in units of the constant speed."""
-        if t >= self.ramp_s:
-            return t - 0.5 * self.ramp_s, 1.0, 0.0
-        x = t / self.ramp_s
-        distance = self.ramp_s * x**4 * (x * x - 3.0 * x + 2.5)
-        return distance, x**3 * (10.0 - 15.0 * x + 6.0 * x * x), 30.0 * x * x * (1.0 - x) ** 2 / self.ramp_s
+
+@compiled
+def progress(hold: float, duration: float, ramp: float, t_s: float) -> tuple[float, float, float]:
+    """Progress (s, s', s'') [-, 1/s, 1/s^2] at `t_s` [s] after a hold, over `duration` with ramps of `ramp` [s]."""
+    t = t_s - hold
+    if t <= 0.0:
+        return 0.0, 0.0, 0.0
+    if t >= duration:
+        return 1.0, 0.0, 0.0
+    speed = 1.0 / (duration - ramp)
+    late = t > 0.5 * duration
+    x, v, a = _speeding_up(ramp, duration - t if late else t)
+    if late:
+        return 1.0 - speed * x, speed * v, -speed * a
+    return speed * x, speed * v, speed * a
+
+
+@compiled
+def _speeding_up(ramp: float, t: float) -> tuple[float, float, float]:
+    """Distance, speed and acceleration after `t` from rest, in units of the constant speed."""
+    if t >= ramp:
+        return t - 0.5 * ramp, 1.0, 0.0
+    x = t / ramp
+    square = x * x
+    distance = ramp * square * square * (square - 3.0 * x + 2.5)
+    return (
+        distance,
+        square * x * (10.0 - 15.0 * x + 6.0 * square),
+        30.0 * square * (1.0 - x) * (1.0 - x) / ramp,
+    )

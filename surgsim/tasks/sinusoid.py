@@ -1,12 +1,37 @@
 """Sinusoid: a wavy incision such as the coronal one."""
 
 import math
-from typing import Literal
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 from pydantic import PositiveFloat
 
-from surgsim.tasks.base import Array, PathTaskConfig, Turns
+from surgsim.compiled import compiled
+from surgsim.tasks.base import DURATION, HOLD, NUMBERS, RAMP, Array, PathTaskConfig, Turns, follow
+from surgsim.tasks.profile import progress
+from surgsim.tick.arrays import Command, Feedback
+from surgsim.tick.status import GOES_ON
+
+
+@compiled
+def sinusoid_path(numbers: Array, s: float, rows: Array) -> None:
+    """Rows point and derivatives (3, 3) in path axes."""
+    A, L, w = numbers[0], numbers[1], 2.0 * math.pi * numbers[2]
+    c, n = A * math.cos(w * s), A * math.sin(w * s)
+    rows[:] = 0.0
+    rows[0, 0], rows[0, 1] = L * s, n
+    rows[1, 0], rows[1, 1] = L, w * c
+    rows[2, 1] = -w * w * n
+
+
+@compiled
+def sinusoid(gains: Array, feedback: Feedback, memory: Array, out: Command) -> int:
+    """The path followed with the profile's progress."""
+    s, s_dot, s_ddot = progress(gains[HOLD], gains[DURATION], gains[RAMP], feedback.t_s)
+    rows = np.empty((3, 3))
+    sinusoid_path(gains[NUMBERS:], s, rows)
+    follow(gains, rows, s_dot, s_ddot, out)
+    return GOES_ON
 
 
 class SinusoidConfig(PathTaskConfig):
@@ -16,13 +41,14 @@ class SinusoidConfig(PathTaskConfig):
     number of periods is not given there.
     """
 
+    kernel: ClassVar[Any] = staticmethod(sinusoid)
+
     type: Literal["sinusoid"] = "sinusoid"
     amplitude_m: PositiveFloat = 0.01
     length_m: PositiveFloat = 0.25
     periods: Turns = 2.0
 
-    def shape(self, s: float) -> Array:
-        """Rows point and derivatives (3, 3) in path axes."""
-        w, A, L = 2.0 * math.pi * self.periods, self.amplitude_m, self.length_m
-        c, n = A * math.cos(w * s), A * math.sin(w * s)
-        return np.array([[L * s, n, 0.0], [L, w * c, 0.0], [0.0, -w * w * n, 0.0]])
+    @property
+    def path(self) -> tuple[Any, tuple[float, ...]]:
+        """The kernel of the path and its numbers."""
+        return sinusoid_path, (self.amplitude_m, self.length_m, self.periods)

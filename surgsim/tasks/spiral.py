@@ -1,12 +1,37 @@
 """Spiral (a helix): the pattern of a simple continuous suture."""
 
 import math
-from typing import Literal
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 from pydantic import PositiveFloat
 
-from surgsim.tasks.base import Array, PathTaskConfig, Turns
+from surgsim.compiled import compiled
+from surgsim.tasks.base import DURATION, HOLD, NUMBERS, RAMP, Array, PathTaskConfig, Turns, follow
+from surgsim.tasks.profile import progress
+from surgsim.tick.arrays import Command, Feedback
+from surgsim.tick.status import GOES_ON
+
+
+@compiled
+def spiral_path(numbers: Array, s: float, rows: Array) -> None:
+    """Rows point and derivatives (3, 3) in path axes."""
+    R, L, w = numbers[0], numbers[1], 2.0 * math.pi * numbers[2]
+    c, n = R * math.cos(w * s), R * math.sin(w * s)
+    rows[:] = 0.0
+    rows[0, 0], rows[0, 1], rows[0, 2] = c - R, n, L * s
+    rows[1, 0], rows[1, 1], rows[1, 2] = -w * n, w * c, L
+    rows[2, 0], rows[2, 1] = -w * w * c, -w * w * n
+
+
+@compiled
+def spiral(gains: Array, feedback: Feedback, memory: Array, out: Command) -> int:
+    """The path followed with the profile's progress."""
+    s, s_dot, s_ddot = progress(gains[HOLD], gains[DURATION], gains[RAMP], feedback.t_s)
+    rows = np.empty((3, 3))
+    spiral_path(gains[NUMBERS:], s, rows)
+    follow(gains, rows, s_dot, s_ddot, out)
+    return GOES_ON
 
 
 class SpiralConfig(PathTaskConfig):
@@ -16,13 +41,14 @@ class SpiralConfig(PathTaskConfig):
     manipulability paper; the number of turns is not given there.
     """
 
+    kernel: ClassVar[Any] = staticmethod(spiral)
+
     type: Literal["spiral"] = "spiral"
     radius_m: PositiveFloat = 0.01
     length_m: PositiveFloat = 0.05
     turns: Turns = 6.0
 
-    def shape(self, s: float) -> Array:
-        """Rows point and derivatives (3, 3) in path axes."""
-        w, R, L = 2.0 * math.pi * self.turns, self.radius_m, self.length_m
-        c, n = R * math.cos(w * s), R * math.sin(w * s)
-        return np.array([[c - R, n, L * s], [-w * n, w * c, L], [-w * w * c, -w * w * n, 0.0]])
+    @property
+    def path(self) -> tuple[Any, tuple[float, ...]]:
+        """The kernel of the path and its numbers."""
+        return spiral_path, (self.radius_m, self.length_m, self.turns)

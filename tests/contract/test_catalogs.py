@@ -10,7 +10,7 @@ from pydantic import ValidationError
 from surgsim.catalog import Catalog
 from surgsim.control.port_estimators import PORT_ESTIMATORS
 from surgsim.control.port_estimators.base import PortProblem
-from surgsim.control.problem import ControlFailure
+from surgsim.control.failure import ControlFailure
 from surgsim.control.resolvers import RESOLVERS
 from surgsim.control.torque_laws import TORQUE_LAWS
 from surgsim.models.build import build

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from surgsim.control.acceleration import AccelerationLimits, PriorityProgram
-from surgsim.control.problem import ControlFailure
+from surgsim.control.failure import ControlFailure
 from surgsim.errors import Outcome
 
 DT = 0.001

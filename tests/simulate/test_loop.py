@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from surgsim.control.problem import ControlFailure
+from surgsim.control.failure import ControlFailure
 from surgsim.errors import Outcome, ScenarioError
 from surgsim.simulate.loop import Simulation, simulate
 from surgsim.simulate.setup import prepare

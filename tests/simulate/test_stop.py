@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from surgsim.cli.main import main
-from surgsim.control.problem import ControlFailure
+from surgsim.control.failure import ControlFailure
 from surgsim.errors import Outcome
 from surgsim.metrics.catalog import compute_metrics
 from surgsim.recording.read import read_recording

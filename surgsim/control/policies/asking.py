@@ -5,9 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from surgsim.control.failure import ControlFailure
 from surgsim.control.policies.observation import Seen, observe
 from surgsim.control.policies.registry import Policy
-from surgsim.control.problem import ControlFailure
 from surgsim.errors import Outcome, SurgsimError
 
 Array = NDArray[np.float64]

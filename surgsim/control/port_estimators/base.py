@@ -1,15 +1,21 @@
-"""Interface of a port estimator."""
+"""Interface of a port estimator: a Python object, or a kernel of the compiled loop."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol, TypeVar
+from typing import Any, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from surgsim.models.arm import Dynamics, Kinematics
+from surgsim.control.failure import ControlFailure, failure_of
+from surgsim.control.seen import dynamics_of, fill_kinematics, kinematics_of, new_seen
+from surgsim.models.arm import ArmModel, Dynamics, Kinematics
+from surgsim.tick.arrays import Seen
+from surgsim.tick.status import GOES_ON
 
 Array = NDArray[np.float64]
 Memory = TypeVar("Memory")
+PortKernel = Callable[[Array, Seen, Array, Array], int]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -19,8 +25,8 @@ class PortProblem:
     Attributes:
         t_s: Time since the start [s].
         dt_s: Control period [s].
-        v: Measured joint velocities (7,) [rad/s].
-        tau_measured: Joint torques that acted over the last period (7,) [N m].
+        v: Measured joint velocities (n,) [rad/s].
+        tau_measured: Joint torques that acted over the last period (n,) [N m].
         kin: Nominal kinematics at the measured positions.
         dyn: Nominal dynamics there; None on the kinematic plant.
         p_WC: Trocar position as seen (3,) [m].
@@ -62,3 +68,67 @@ class PortEstimator(Protocol[Memory]):
     def step(self, problem: PortProblem, memory: Memory) -> tuple[PortEstimate, Memory]:
         """The estimate for this tick, and the state for the next."""
         ...
+
+
+@dataclass(frozen=True, kw_only=True)
+class KernelPortEstimator:
+    """A port estimator that is a kernel: the loop calls the kernel, this calls it from Python.
+
+    Attributes:
+        kernel: status = kernel(gains, seen, memory, out (3, 3)); compiled, or plain Python.
+        arm: The nominal arm.
+        gains: Its numbers, laid out as the kernel says.
+        memory_size: Length of its memory, all zeros before the first tick.
+        estimates: Whether the estimate differs from the trocar as seen, and is recorded.
+    """
+
+    kernel: PortKernel
+    arm: ArmModel
+    gains: Array
+    memory_size: int = 0
+    estimates: bool = True
+
+    def start(self, problem: PortProblem) -> None:
+        """The kernel makes its own memory at the first tick."""
+
+    def step(self, problem: PortProblem, memory: Array | None) -> tuple[PortEstimate, Array]:
+        """The estimate, and the kernel's memory; None is that before the first tick.
+
+        Raises:
+            ControlFailure: If the kernel has no answer.
+        """
+        seen = self._seen(problem)
+        seen.first = memory is None
+        after = np.zeros(self.memory_size) if memory is None else memory.copy()
+        out = np.zeros((3, 3))
+        status = self.kernel(self.gains, seen, after, out)
+        if status != GOES_ON:
+            raise self.failure(status, seen)
+        return PortEstimate(p_WC=out[0], v_WC=out[1], a_WC=out[2]), after
+
+    def failure(self, status: int, seen: Seen) -> ControlFailure:
+        """Why there is no estimate."""
+        return failure_of(status, {}, {"q": seen.q.copy()})
+
+    def _seen(self, p: PortProblem) -> Any:
+        seen = new_seen(self.arm, dt_s=p.dt_s, has_trocar=False)
+        seen.t_s, seen.v[:], seen.tau[:] = p.t_s, p.v, p.tau_measured
+        fill_kinematics(seen, p.kin)
+        if p.dyn is not None:
+            seen.M[:], seen.bias[:] = p.dyn.mass_matrix, p.dyn.bias
+        seen.p_WC[:], seen.v_WC[:] = p.p_WC, p.v_WC
+        return seen
+
+
+def port_problem_of(seen: Seen, *, has_dynamics: bool) -> PortProblem:
+    """What a port estimator in Python is given."""
+    return PortProblem(
+        t_s=float(seen.t_s),
+        dt_s=float(seen.dt_s),
+        v=seen.v.copy(),
+        tau_measured=seen.tau.copy(),
+        kin=kinematics_of(seen),
+        dyn=dynamics_of(seen) if has_dynamics else None,
+        p_WC=seen.p_WC.copy(),
+        v_WC=seen.v_WC.copy(),
+    )

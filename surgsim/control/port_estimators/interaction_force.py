@@ -1,7 +1,6 @@
 """Interaction force: a trocar that nobody measures, inferred from what the wall does to the shaft."""
 
 import math
-from dataclasses import dataclass
 from typing import Annotated, Literal
 
 import numpy as np
@@ -10,13 +9,19 @@ from pydantic import Field, NonNegativeFloat, PositiveFloat
 
 from surgsim.catalog import PartConfig
 from surgsim.compiled import compiled
-from surgsim.control.observer import DisturbanceObserver, ObserverState
-from surgsim.control.port_estimators.base import PortEstimate, PortProblem
-from surgsim.control.rcm import rcm_kinematics
+from surgsim.control.observer import observe, observer_size
+from surgsim.control.port_estimators.base import KernelPortEstimator
+from surgsim.control.rcm import fill_rcm
 from surgsim.models.arm import ArmModel
+from surgsim.tick.algebra import back_substitute, back_substitute_rows, dot, factor, norm, outer_product
+from surgsim.tick.arrays import Seen
+from surgsim.tick.status import GOES_ON, RANK_LOST
 
 Array = NDArray[np.float64]
 _ADVANCE = 0.25 * math.pi
+
+COMPLIANCE, OBSERVER, TARE_S, THRESHOLD, OMEGA, HARMONICS, LEARNING, MOST = range(8)
+"""Places of the gains; OMEGA in rad/s, the others as in the config."""
 
 
 class InteractionForceConfig(PartConfig):
@@ -44,31 +49,29 @@ class InteractionForceConfig(PartConfig):
     harmonic_gain_m_per_n_s: NonNegativeFloat = 0.016
     most_m: PositiveFloat = 0.03
 
-    def build(self, arm: ArmModel) -> "InteractionForce":
-        """The estimator."""
-        return InteractionForce(self, arm)
+    def build(self, arm: ArmModel) -> KernelPortEstimator:
+        """The estimator; memory tare (3,), offset (3,), ticks, waves (2 harmonics, 3), the observer's."""
+        count = self.harmonics if self.rate_hz else 0
+        gains = [
+            self.compliance_m_per_n_s,
+            self.observer_gain,
+            self.tare_s,
+            self.threshold_n,
+            2.0 * math.pi * (self.rate_hz or 0.0),
+            count,
+            self.harmonic_gain_m_per_n_s,
+            self.most_m,
+        ]
+        return KernelPortEstimator(
+            kernel=interaction_force,
+            arm=arm,
+            gains=np.array(gains, dtype=np.float64),
+            memory_size=7 + 6 * count + observer_size(arm.limits.torque.size),
+        )
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class InteractionForceMemory:
-    """State of the estimator.
-
-    Attributes:
-        observer: State of the disturbance observer.
-        tare: Mean force so far, or at the end of the tare (3,) [N].
-        ticks: Ticks so far.
-        offset: Slow part of the estimate's distance from the trocar as seen (3,) [m].
-        waves: Cosine and sine amplitude of each harmonic (2 harmonics, 3) [m].
-    """
-
-    observer: ObserverState
-    tare: Array
-    ticks: int
-    offset: Array
-    waves: Array
-
-
-class InteractionForce:
+@compiled
+def interaction_force(gains: Array, seen: Seen, memory: Array, out: Array) -> int:
     """The port is where the wall leaves the shaft alone.
 
         f = (J_rcm M^-1 J_rcm^T)^-1 J_rcm M^-1 d,    F = N^T f - tare
@@ -85,72 +88,85 @@ class InteractionForce:
 
     Source: ours; admittance to zero force, and adaptive feed-forward cancellation (Bodson and Douglas 1997).
     """
-
-    def __init__(self, config: InteractionForceConfig, arm: ArmModel) -> None:
-        self._c = config
-        self._observer = DisturbanceObserver(config.observer_gain, arm.damping)
-        count = config.harmonics if config.rate_hz else 0
-        self._omega = 2.0 * math.pi * (config.rate_hz or 0.0) * np.arange(1, count + 1)
-
-    def start(self, problem: PortProblem) -> InteractionForceMemory:
-        """At the trocar as seen, with no force known."""
-        return InteractionForceMemory(
-            observer=self._observer.start(),
-            tare=np.zeros(3),
-            ticks=0,
-            offset=np.zeros(3),
-            waves=np.zeros((2 * len(self._omega), 3)),
-        )
-
-    def step(
-        self, problem: PortProblem, memory: InteractionForceMemory
-    ) -> tuple[PortEstimate, InteractionForceMemory]:
-        """Give way to the force since the last tick."""
-        observer = self._observer.update(memory.observer, problem)
-        force = self._force(problem, observer.disturbance)
-        ticks, tare = memory.ticks + 1, memory.tare
-        offset, waves = memory.offset, memory.waves
-        phase = self._omega * problem.t_s
-        swing = np.concatenate((np.cos(phase), np.sin(phase)))
-        learnt = np.concatenate((np.cos(phase + _ADVANCE), np.sin(phase + _ADVANCE)))
-        if problem.t_s < self._c.tare_s:
-            tare = tare + (force - tare) / ticks
-            push = np.zeros(3)
-        else:
-            push = _beyond(force - tare, self._c.threshold_n)
-        last = offset
-        offset = _within(last + problem.dt_s * self._c.compliance_m_per_n_s * push, self._c.most_m)
-        waves = waves + problem.dt_s * self._c.harmonic_gain_m_per_n_s * np.outer(learnt, push)
-        rate = np.concatenate((-self._omega * np.sin(phase), self._omega * np.cos(phase)))
-        curve = np.concatenate((self._omega, self._omega)) ** 2 * -swing
-        estimate = PortEstimate(
-            p_WC=problem.p_WC + offset + swing @ waves,
-            v_WC=problem.v_WC + (offset - last) / problem.dt_s + rate @ waves,
-            a_WC=curve @ waves,
-        )
-        return estimate, InteractionForceMemory(
-            observer=observer, tare=tare, ticks=ticks, offset=offset, waves=waves
-        )
-
-    def _force(self, problem: PortProblem, disturbance: Array) -> Array:
-        """Lateral force of the wall on the shaft, world frame (3,) [N]."""
-        assert problem.dyn is not None, "a force cannot be inferred on the kinematic plant"
-        rcm = rcm_kinematics(problem.kin, problem.p_WC, problem.v_WC)
-        return _lateral(rcm.jacobian, rcm.normals, problem.dyn.mass_matrix, disturbance)
+    t, dt, count = seen.t_s, seen.dt_s, int(gains[HARMONICS])
+    tare, offset = memory[:3], memory[3:6]
+    waves = memory[7 : 7 + 6 * count].reshape((2 * count, 3))
+    d = observe(
+        memory[7 + 6 * count :],
+        seen.first != 0,
+        seen.M,
+        seen.bias,
+        seen.damping,
+        seen.v,
+        seen.tau,
+        gains[OBSERVER],
+        dt,
+    )
+    force, push = np.empty(3), np.zeros(3)
+    if not _lateral_force(seen, d, force):
+        return RANK_LOST
+    memory[6] += 1.0
+    if t < gains[TARE_S]:
+        for i in range(3):
+            tare[i] += (force[i] - tare[i]) / memory[6]
+    else:
+        for i in range(3):
+            force[i] -= tare[i]
+        size = norm(force)
+        if size > gains[THRESHOLD]:
+            for i in range(3):
+                push[i] = force[i] * (1.0 - gains[THRESHOLD] / size)
+    moved = np.empty(3)
+    for i in range(3):
+        moved[i] = offset[i] + dt * gains[COMPLIANCE] * push[i]
+    within = min(1.0, gains[MOST] / max(norm(moved), 1e-12))
+    for i in range(3):
+        moved[i] *= within
+        out[0, i] = seen.p_WC[i] + moved[i]
+        out[1, i] = seen.v_WC[i] + (moved[i] - offset[i]) / dt
+        out[2, i] = 0.0
+        offset[i] = moved[i]
+    for k in range(count):
+        w = (k + 1) * gains[OMEGA]
+        c, s = math.cos(w * t), math.sin(w * t)
+        learn_c, learn_s = math.cos(w * t + _ADVANCE), math.sin(w * t + _ADVANCE)
+        for i in range(3):
+            waves[k, i] += dt * gains[LEARNING] * learn_c * push[i]
+            waves[count + k, i] += dt * gains[LEARNING] * learn_s * push[i]
+            a, b = waves[k, i], waves[count + k, i]
+            out[0, i] += c * a + s * b
+            out[1, i] += w * (c * b - s * a)
+            out[2, i] -= w * w * (c * a + s * b)
+    return GOES_ON
 
 
 @compiled
-def _lateral(J: Array, N: Array, M: Array, d: Array) -> Array:
-    JMinv = np.ascontiguousarray(np.linalg.solve(M, J.T).T)
-    return np.ascontiguousarray(N.T) @ np.linalg.solve(JMinv @ J.T, JMinv @ d)
-
-
-def _beyond(force: Array, threshold: float) -> Array:
-    """`force` shortened by `threshold`, zero below it."""
-    size = float(np.linalg.norm(force))
-    return force * (1.0 - threshold / size) if size > threshold else np.zeros(3)
-
-
-def _within(offset: Array, most: float) -> Array:
-    """`offset` shortened to `most`."""
-    return offset * min(1.0, most / max(float(np.linalg.norm(offset)), 1e-12))
+def _lateral_force(seen: Seen, d: Array, out: Array) -> bool:
+    """Lateral force of the wall on the shaft, world frame (3,) [N]; False where J_rcm has lost rank."""
+    n = d.size
+    error, J, velocity = np.empty(2), np.empty((2, n)), np.empty(2)
+    N = np.empty((2, 3))
+    fill_rcm(
+        seen.p_WT,
+        seen.R_WT,
+        seen.Jv_WT,
+        seen.Jw_WT,
+        seen.p_WC,
+        seen.v_WC,
+        error,
+        J,
+        velocity,
+        N,
+    )
+    L, Y, A, f = seen.M.copy(), J.copy(), np.empty((2, 2)), np.empty(2)
+    if not factor(L):
+        return False
+    back_substitute_rows(L, Y)
+    outer_product(Y, J, A)
+    if not factor(A):
+        return False
+    f[0], f[1] = dot(Y[0], d), dot(Y[1], d)
+    back_substitute(A, f)
+    for i in range(3):
+        out[i] = N[0, i] * f[0] + N[1, i] * f[1]
+    return True

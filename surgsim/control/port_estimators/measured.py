@@ -5,11 +5,11 @@ from typing import Literal
 import numpy as np
 
 from surgsim.catalog import PartConfig
-from surgsim.control.port_estimators.base import PortEstimate, PortProblem
+from surgsim.compiled import compiled
+from surgsim.control.port_estimators.base import Array, KernelPortEstimator
 from surgsim.models.arm import ArmModel
-
-_STILL = np.zeros(3)
-_STILL.flags.writeable = False
+from surgsim.tick.arrays import Seen
+from surgsim.tick.status import GOES_ON
 
 
 class MeasuredPortConfig(PartConfig):
@@ -17,17 +17,14 @@ class MeasuredPortConfig(PartConfig):
 
     type: Literal["measured"] = "measured"
 
-    def build(self, arm: ArmModel) -> "MeasuredPort":
+    def build(self, arm: ArmModel) -> KernelPortEstimator:
         """The estimator."""
-        return MeasuredPort()
+        return KernelPortEstimator(kernel=measured_port, arm=arm, gains=np.zeros(0), estimates=False)
 
 
-class MeasuredPort:
-    """p_WC and v_WC of the state, no acceleration."""
-
-    def start(self, problem: PortProblem) -> None:
-        """It has no state."""
-
-    def step(self, problem: PortProblem, memory: None) -> tuple[PortEstimate, None]:
-        """The trocar as seen."""
-        return PortEstimate(p_WC=problem.p_WC, v_WC=problem.v_WC, a_WC=_STILL), None
+@compiled
+def measured_port(gains: Array, seen: Seen, memory: Array, out: Array) -> int:
+    """p_WC and v_WC as they are seen, no acceleration."""
+    for i in range(3):
+        out[0, i], out[1, i], out[2, i] = seen.p_WC[i], seen.v_WC[i], 0.0
+    return GOES_ON

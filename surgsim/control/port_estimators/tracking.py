@@ -1,7 +1,6 @@
 """Tracking: position, velocity and acceleration of a trocar whose position is measured."""
 
 import math
-from dataclasses import dataclass
 from typing import Annotated, Literal
 
 import numpy as np
@@ -9,8 +8,11 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from surgsim.catalog import PartConfig
-from surgsim.control.port_estimators.base import PortEstimate, PortProblem
+from surgsim.compiled import compiled
+from surgsim.control.port_estimators.base import KernelPortEstimator
 from surgsim.models.arm import ArmModel
+from surgsim.tick.arrays import Seen
+from surgsim.tick.status import GOES_ON
 
 Array = NDArray[np.float64]
 
@@ -29,63 +31,46 @@ class TrackingConfig(PartConfig):
     memory_s: Annotated[float, Field(gt=0.0, le=1.0)] = 0.02
     sample_hold_s: Annotated[float, Field(gt=0.0, le=1.0)] = 0.05
 
-    def build(self, arm: ArmModel) -> "Tracking":
-        """The estimator."""
-        return Tracking(self)
+    def build(self, arm: ArmModel) -> KernelPortEstimator:
+        """The estimator; gains memory_s, sample_hold_s; memory rows motion (3, 3), seen (3,), since."""
+        gains = np.array([self.memory_s, self.sample_hold_s])
+        return KernelPortEstimator(kernel=tracking, arm=arm, gains=gains, memory_size=13)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class TrackingMemory:
-    """State of the filter.
-
-    Attributes:
-        motion: Rows position, velocity and acceleration (3, 3), SI.
-        seen: Last new sample (3,) [m].
-        since_s: Time since it [s].
-    """
-
-    motion: Array
-    seen: Array
-    since_s: float = 0.0
-
-
-class Tracking:
-    """x <- predicted x + gain (sample - predicted position), at every new sample.
+@compiled
+def tracking(gains: Array, seen: Seen, memory: Array, out: Array) -> int:
+    """X <- predicted x + gain (sample - predicted position), at every new sample.
 
         gains  1 - b^3,  3/2 (1 - b)^2 (1 + b) / T,  (1 - b)^3 / T^2,      b = exp(-T / memory)
 
     with T the time since the last sample: all three poles of the error are b, and a constant acceleration is
-    followed without lag. It starts at rest.
+    followed without lag. It starts at rest at the first sample.
 
     Source: the fading-memory polynomial filter of degree two (Morrison, Introduction to Sequential Smoothing
     and Prediction, 1969).
     """
-
-    def __init__(self, config: TrackingConfig) -> None:
-        self._c = config
-
-    def start(self, problem: PortProblem) -> TrackingMemory:
-        """At the first sample, at rest."""
-        motion = np.zeros((3, 3))
-        motion[0] = problem.p_WC
-        return TrackingMemory(motion=motion, seen=problem.p_WC.copy())
-
-    def step(self, problem: PortProblem, memory: TrackingMemory) -> tuple[PortEstimate, TrackingMemory]:
-        """Predict over the period since the last tick, and take in a new sample if there is one."""
-        dt, x = problem.dt_s, memory.motion
-        since = memory.since_s + dt
-        ahead = np.array([x[0] + dt * (x[1] + 0.5 * dt * x[2]), x[1] + dt * x[2], x[2]])
-        new = since >= self._c.sample_hold_s - 1e-9 or not np.array_equal(problem.p_WC, memory.seen)
-        if new:
-            gains = _gains(since, self._c.memory_s)
-            ahead = ahead + gains[:, None] * (problem.p_WC - ahead[0])
-            memory = TrackingMemory(motion=ahead, seen=problem.p_WC.copy())
-        else:
-            memory = TrackingMemory(motion=ahead, seen=memory.seen, since_s=since)
-        return PortEstimate(p_WC=ahead[0], v_WC=ahead[1], a_WC=ahead[2]), memory
-
-
-def _gains(T: float, memory_s: float) -> Array:
-    """Gains of position, velocity and acceleration (3,) for a sample after `T` [s]."""
-    b = math.exp(-T / memory_s)
-    return np.array([1.0 - b**3, 1.5 * (1.0 - b) ** 2 * (1.0 + b) / T, (1.0 - b) ** 3 / T**2])
+    dt, x, sample = seen.dt_s, memory[:9].reshape((3, 3)), memory[9:12]
+    if seen.first != 0:
+        for i in range(3):
+            x[0, i] = sample[i] = seen.p_WC[i]
+    memory[12] += dt
+    is_new = memory[12] >= gains[1] - 1e-9
+    for i in range(3):
+        x[0, i] += dt * (x[1, i] + 0.5 * dt * x[2, i])
+        x[1, i] += dt * x[2, i]
+        is_new = is_new or seen.p_WC[i] != sample[i]
+    if is_new:
+        T = memory[12]
+        b = math.exp(-T / gains[0])
+        left = 1.0 - b
+        for i in range(3):
+            gap = seen.p_WC[i] - x[0, i]
+            x[0, i] += (1.0 - b * b * b) * gap
+            x[1, i] += 1.5 * left * left * (1.0 + b) / T * gap
+            x[2, i] += left * left * left / (T * T) * gap
+            sample[i] = seen.p_WC[i]
+        memory[12] = 0.0
+    for k in range(3):
+        for i in range(3):
+            out[k, i] = x[k, i]
+    return GOES_ON

@@ -7,10 +7,14 @@ from numpy.typing import NDArray
 from pydantic import NonNegativeFloat
 
 from surgsim.catalog import PartConfig
-from surgsim.control.manipulability import log_manipulability_gradient
-from surgsim.control.null_space import least_velocity
-from surgsim.control.problem import Resolution, VelocityProblem, bounded_resolution, stacked_rows
+from surgsim.compiled import compiled
+from surgsim.control.manipulability import fill_log_manipulability_gradient
+from surgsim.control.resolvers.base import KernelResolver
+from surgsim.control.resolvers.rows import answer, task_rows
 from surgsim.models.arm import ArmModel
+from surgsim.tick.algebra import nearest
+from surgsim.tick.arrays import Resolved, Seen
+from surgsim.tick.status import GOES_ON, RANK_LOST
 
 Array = NDArray[np.float64]
 
@@ -31,27 +35,30 @@ class GradientConfig(PartConfig):
     k_rcm: NonNegativeFloat = 5.0
     rcm: bool = True
 
-    def build(self, arm: ArmModel) -> "Gradient":
-        """The resolver."""
-        return Gradient(self)
+    def build(self, arm: ArmModel) -> KernelResolver:
+        """The resolver; gains k_tip, k_rcm, rcm, k."""
+        gains = np.array([self.k_tip, self.k_rcm, self.rcm, self.gain_rad2_per_s], dtype=np.float64)
+        return KernelResolver(kernel=gradient, arm=arm, gains=gains)
 
 
-class Gradient:
-    """q' = pinv(J) v + (I - pinv(J) J) k grad(ln mu), projected on Omega.
+@compiled
+def gradient(gains: Array, seen: Seen, memory: Array, out: Resolved) -> int:
+    """Climb in the null space, q' = pinv(J) v + (I - pinv(J) J) k grad(ln mu), projected on Omega.
 
     The gradient is scaled to the velocity limits as a whole before it is projected, so that a large k gives a
     bounded self-motion. Source: Liegeois 1977; the comparison of the VPRNN paper, section IV.
     """
-
-    def __init__(self, config: GradientConfig) -> None:
-        self._c = config
-
-    def start(self, problem: VelocityProblem) -> None:
-        """The resolver has no state."""
-
-    def step(self, problem: VelocityProblem, memory: None) -> tuple[Resolution, None]:
-        """Joint velocities for one period."""
-        J, v = stacked_rows(problem, self._c.k_tip, self._c.k_rcm, rcm=self._c.rcm)
-        climb = self._c.gain_rad2_per_s * log_manipulability_gradient(problem.kin.Jv_WT, problem.kin.z_W)
-        climb = climb / max(1.0, float(np.max(np.abs(climb) / problem.limits.velocity)))
-        return bounded_resolution(problem, least_velocity(J, v, climb), J, v), None
+    J, v = task_rows(seen, gains[0], gains[1], gains[2] != 0.0)
+    climb = np.empty(seen.q.size)
+    if not fill_log_manipulability_gradient(seen.Jv_WT, seen.z_W, climb):
+        return RANK_LOST
+    most = 1.0
+    for j in range(climb.size):
+        climb[j] *= gains[3]
+        most = max(most, abs(climb[j]) / seen.v_max[j])
+    for j in range(climb.size):
+        climb[j] /= most
+    if not nearest(J, v, climb, climb):
+        return RANK_LOST
+    answer(seen, climb, J, v, out)
+    return GOES_ON

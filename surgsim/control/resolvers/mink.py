@@ -9,14 +9,9 @@ from numpy.typing import NDArray
 from pydantic import NonNegativeFloat, PositiveFloat
 
 from surgsim.catalog import PartConfig
+from surgsim.control.failure import ControlFailure
 from surgsim.control.mink_tasks import RcmTask
-from surgsim.control.problem import (
-    ControlFailure,
-    Resolution,
-    VelocityProblem,
-    bounded_resolution,
-    stacked_rows,
-)
+from surgsim.control.problem import Resolution, VelocityProblem, bounded_resolution, stacked_rows
 from surgsim.errors import Outcome
 from surgsim.models.arm import ArmModel
 

@@ -11,8 +11,9 @@ from pydantic import AfterValidator, Field, NonNegativeFloat, PositiveFloat
 from surgsim.catalog import PartConfig
 from surgsim.columns import Block, scalar, vector
 from surgsim.compiled import compiled
+from surgsim.control.failure import ControlFailure
 from surgsim.control.planes import PlaneConfig, Planes
-from surgsim.control.problem import ControlFailure, Resolution, VelocityProblem, braking_bounds
+from surgsim.control.problem import Resolution, VelocityProblem, braking_bounds
 from surgsim.control.qp import DenseQp
 from surgsim.control.resolvers.qp import check_backend
 from surgsim.errors import Outcome

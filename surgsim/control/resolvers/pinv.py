@@ -7,14 +7,13 @@ from numpy.typing import NDArray
 from pydantic import NonNegativeFloat
 
 from surgsim.catalog import PartConfig
-from surgsim.control.null_space import least_velocity
-from surgsim.control.problem import (
-    Resolution,
-    VelocityProblem,
-    bounded_resolution,
-    stacked_rows,
-)
+from surgsim.compiled import compiled
+from surgsim.control.resolvers.base import KernelResolver
+from surgsim.control.resolvers.rows import answer, task_rows
 from surgsim.models.arm import ArmModel
+from surgsim.tick.algebra import nearest
+from surgsim.tick.arrays import Resolved, Seen
+from surgsim.tick.status import GOES_ON, RANK_LOST
 
 Array = NDArray[np.float64]
 
@@ -33,24 +32,21 @@ class PinvConfig(PartConfig):
     k_rcm: NonNegativeFloat = 5.0
     rcm: bool = True
 
-    def build(self, arm: ArmModel) -> "Pinv":
-        """The resolver."""
-        return Pinv(self)
+    def build(self, arm: ArmModel) -> KernelResolver:
+        """The resolver; gains k_tip, k_rcm, rcm."""
+        gains = np.array([self.k_tip, self.k_rcm, self.rcm], dtype=np.float64)
+        return KernelResolver(kernel=pinv, arm=arm, gains=gains)
 
 
-class Pinv:
-    """q' = pinv(J) v, eq. (2)-(5) of the manipulability paper, projected on Omega.
+@compiled
+def pinv(gains: Array, seen: Seen, memory: Array, out: Resolved) -> int:
+    """Least joint velocity, q' = pinv(J) v, eq. (2)-(5) of the manipulability paper, projected on Omega.
 
-    J = J_T (3, 7), or [J_T; J_rcm] (5, 7); v is the desired velocity with feedback, see `stacked_rows`.
+    J = J_T (3, n), or [J_T; J_rcm] (5, n); v is the desired velocity with feedback, see `task_rows`.
     """
-
-    def __init__(self, config: PinvConfig) -> None:
-        self._c = config
-
-    def start(self, problem: VelocityProblem) -> None:
-        """The resolver has no state."""
-
-    def step(self, problem: VelocityProblem, memory: None) -> tuple[Resolution, None]:
-        """Joint velocities for one period."""
-        J, v = stacked_rows(problem, self._c.k_tip, self._c.k_rcm, rcm=self._c.rcm)
-        return bounded_resolution(problem, least_velocity(J, v), J, v), None
+    J, v = task_rows(seen, gains[0], gains[1], gains[2] != 0.0)
+    qdot = np.zeros(seen.q.size)
+    if not nearest(J, v, qdot, qdot):
+        return RANK_LOST
+    answer(seen, qdot, J, v, out)
+    return GOES_ON

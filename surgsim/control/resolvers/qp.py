@@ -7,10 +7,10 @@ from numpy.typing import NDArray
 from pydantic import AfterValidator, NonNegativeFloat, PositiveFloat
 
 from surgsim.catalog import PartConfig
+from surgsim.control.failure import ControlFailure
 from surgsim.control.manipulability import log_manipulability_gradient
 from surgsim.control.planes import PlaneConfig, Planes
 from surgsim.control.problem import (
-    ControlFailure,
     Resolution,
     VelocityProblem,
     bounded_resolution,

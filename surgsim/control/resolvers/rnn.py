@@ -1,7 +1,6 @@
 """RNN: the dynamic neural network of Jin et al. for manipulability optimisation."""
 
 import math
-from dataclasses import dataclass
 from typing import Annotated, Literal
 
 import numpy as np
@@ -11,15 +10,12 @@ from pydantic import Field, NonNegativeFloat, PositiveFloat
 from surgsim.catalog import PartConfig
 from surgsim.compiled import compiled
 from surgsim.control.manipulability import diamond, jacobian_gradient
-from surgsim.control.problem import (
-    ControlFailure,
-    Resolution,
-    VelocityProblem,
-    bounded_resolution,
-    stacked_rows,
-)
-from surgsim.errors import Outcome
+from surgsim.control.resolvers.base import KernelResolver
+from surgsim.control.resolvers.rows import answer, task_rows
 from surgsim.models.arm import ArmModel
+from surgsim.tick.algebra import back_substitute_rows, factor, outer_product, times, transposed_times
+from surgsim.tick.arrays import Resolved, Seen
+from surgsim.tick.status import DIVERGED, GOES_ON, RANK_LOST
 
 Array = NDArray[np.float64]
 _DIVERGED = 1e12
@@ -55,22 +51,34 @@ class RnnConfig(PartConfig):
     form: Literal["corrected", "printed"] = "corrected"
     step_over_epsilon: Annotated[float, Field(gt=0.0, le=1.0)] = 0.05
 
-    def build(self, arm: ArmModel) -> "Rnn":
-        """The resolver."""
-        return Rnn(self)
+    def build(self, arm: ArmModel) -> KernelResolver:
+        """The resolver; memory omega (n,), phi (9,), sigma (9,), lam (r,), the neural states of eq. (6)-(9)."""
+        gains = np.array(
+            [
+                self.c0,
+                self.c1,
+                self.c2,
+                self.c3,
+                self.epsilon_s,
+                self.k_tip,
+                self.k_rcm,
+                self.rcm,
+                1.0 if self.form == "corrected" else -1.0,
+                self.step_over_epsilon,
+            ],
+            dtype=np.float64,
+        )
+        return KernelResolver(
+            kernel=rnn,
+            arm=arm,
+            gains=gains,
+            memory_size=arm.limits.q_min.size + 23,
+            failures={DIVERGED: f"RNN ({self.form} form): a neural state exceeds 1e12"},
+        )
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class RnnMemory:
-    """Neural states: omega (7,), phi (9,), lam (r,), sigma (9,) of eq. (6)-(9)."""
-
-    omega: Array
-    phi: Array
-    lam: Array
-    sigma: Array
-
-
-class Rnn:
+@compiled
+def rnn(gains: Array, seen: Seen, memory: Array, out: Resolved) -> int:
     """The network of eq. (6)-(9) of the manipulability paper, with D = J <> H and B = I x J J^T.
 
         eps omega'  = -omega + P_Omega[c3 D phi - c0 J_a^T (J_a omega - v) + (1 - c2) omega - J_a^T lam]
@@ -82,94 +90,92 @@ class Rnn:
     [J_T; J_rcm]. The command is the mean of omega over the period, so that without feedback the integrated
     tip error is exactly eps (lam - lam(0)). In the steady state omega = pinv(J_a) v + (c3/c2) N grad(ln mu).
 
-    The network starts at omega = 0, phi = vec((J J^T)^-1), lam = 0, sigma = 0.
+    The network starts at omega = 0, phi = vec((J J^T)^-1), lam = 0, sigma = 0. It is stepped by explicit
+    Euler over a whole number of steps a period.
     """
+    n = seen.q.size
+    omega, phi, sigma, lam = memory[:n], memory[n : n + 9], memory[n + 9 : n + 18], memory[n + 18 :]
+    A = np.empty((3, 3))
+    outer_product(seen.Jv_WT, seen.Jv_WT, A)
+    if seen.first != 0 and not _inverse(A, phi):
+        return RANK_LOST
+    J, v = task_rows(seen, gains[5], gains[6], gains[7] != 0.0)
+    D = diamond(seen.Jv_WT, jacobian_gradient(seen.Jv_WT, seen.z_W))
+    substeps = math.ceil(seen.dt_s / (gains[9] * gains[4]) - 1e-9)
+    h = seen.dt_s / substeps / gains[4]
+    mean = np.zeros(n)
+    _flow(gains, seen, J, v, D, A, omega, phi, sigma, lam[: v.size], h, substeps, mean)
+    for i in range(9):
+        if not (abs(phi[i]) < _DIVERGED and abs(sigma[i]) < _DIVERGED):
+            return DIVERGED
+    answer(seen, mean, J, v, out)
+    return GOES_ON
 
-    def __init__(self, config: RnnConfig) -> None:
-        self._c = config
 
-    def start(self, problem: VelocityProblem) -> RnnMemory:
-        """Neural states at rest, phi at its solution."""
-        J, _ = self._rows(problem)
-        A = problem.kin.Jv_WT @ problem.kin.Jv_WT.T
-        return RnnMemory(
-            omega=np.zeros(7),
-            phi=np.asarray(np.linalg.inv(A)).ravel(),
-            lam=np.zeros(len(J)),
-            sigma=np.zeros(9),
-        )
+@compiled
+def _inverse(A: Array, out: Array) -> bool:
+    """Out (9,) = vec(A^-1) of a symmetric A (3, 3); False where it is singular."""
+    L, X = A.copy(), np.eye(3)
+    if not factor(L):
+        return False
+    back_substitute_rows(L, X)
+    for i in range(3):
+        for j in range(3):
+            out[3 * i + j] = X[i, j]
+    return True
 
-    def step(self, problem: VelocityProblem, memory: RnnMemory) -> tuple[Resolution, RnnMemory]:
-        """Integrate the network over one period."""
-        c, kin = self._c, problem.kin
-        J_a, v = self._rows(problem)
-        substeps = math.ceil(problem.dt_s / (c.step_over_epsilon * c.epsilon_s) - 1e-9)
-        D = diamond(kin.Jv_WT, jacobian_gradient(kin.Jv_WT, kin.z_W))
-        sign = 1.0 if c.form == "corrected" else -1.0
-        mean, omega, phi, lam, sigma = _flow(
-            J_a,
-            v,
-            D,
-            kin.Jv_WT @ kin.Jv_WT.T,
-            problem.lower,
-            problem.upper,
-            memory.omega,
-            memory.phi,
-            memory.lam,
-            memory.sigma,
-            c.c0,
-            c.c1,
-            c.c2,
-            c.c3,
-            sign,
-            problem.dt_s / substeps / c.epsilon_s,
-            substeps,
-        )
-        if not (np.abs(phi).max() < _DIVERGED and np.abs(sigma).max() < _DIVERGED):
-            raise ControlFailure(Outcome.DIVERGED, f"RNN ({c.form} form): a neural state exceeds 1e12")
-        out = RnnMemory(omega=omega, phi=phi, lam=lam, sigma=sigma)
-        return bounded_resolution(problem, mean, J_a, v), out
 
-    def _rows(self, problem: VelocityProblem) -> tuple[Array, Array]:
-        return stacked_rows(problem, self._c.k_tip, self._c.k_rcm, rcm=self._c.rcm)
+@compiled
+def _block_times(A: Array, x: Array, out: Array) -> None:
+    """Out (9,) = (I x A) x for a symmetric A (3, 3)."""
+    for i in range(3):
+        for j in range(3):
+            s = 0.0
+            for k in range(3):
+                s += x[3 * i + k] * A[k, j]
+            out[3 * i + j] = s
 
 
 @compiled
 def _flow(
+    gains: Array,
+    seen: Seen,
     J: Array,
     v: Array,
     D: Array,
     A: Array,
-    lower: Array,
-    upper: Array,
     omega: Array,
     phi: Array,
-    lam: Array,
     sigma: Array,
-    c0: float,
-    c1: float,
-    c2: float,
-    c3: float,
-    sign: float,
+    lam: Array,
     h: float,
     substeps: int,
-) -> tuple[Array, Array, Array, Array, Array]:
-    """`substeps` explicit Euler steps of length `h` time constants; also the mean of omega over them."""
-    vec_I = np.eye(3).ravel()
-    mean = np.zeros(7)
-    DT = np.ascontiguousarray(D.T)
-    JT = np.ascontiguousarray(J.T)
+    mean: Array,
+) -> None:
+    """`substeps` explicit Euler steps of length `h` time constants; `mean` is that of omega over them."""
+    c0, c1, c2, c3, sign = gains[0], gains[1], gains[2], gains[3], gains[8]
+    n, m = omega.size, v.size
+    gap, pull, inside, climb = np.empty(m), np.empty(m), np.empty(n), np.empty(n)
+    B_phi, B_gap, B_sigma, turned = np.empty(9), np.empty(9), np.empty(9), np.empty(9)
     for _ in range(substeps):
-        mean += omega
-        gap = J @ omega - v
-        B_phi = (phi.reshape(3, 3) @ A).ravel()
-        B_gap = ((B_phi - vec_I).reshape(3, 3) @ A).ravel()
-        B_sigma = (sigma.reshape(3, 3) @ A).ravel()
-        inside = c3 * (D @ phi) - JT @ (c0 * gap + lam) + (1.0 - c2) * omega
-        inside = np.minimum(np.maximum(inside, lower), upper)
-        d_phi = sign * (c3 * (DT @ omega) - c1 * B_gap) + B_sigma
-        omega = omega + h * (inside - omega)
-        phi = phi + h * d_phi
-        lam = lam + h * gap
-        sigma = sigma + h * (vec_I - B_phi)
-    return mean / substeps, omega, phi, lam, sigma
+        times(J, omega, gap)
+        for i in range(m):
+            gap[i] -= v[i]
+            pull[i] = c0 * gap[i] + lam[i]
+        _block_times(A, phi, B_phi)
+        for i in range(3):
+            B_phi[4 * i] -= 1.0
+        _block_times(A, B_phi, B_gap)
+        _block_times(A, sigma, B_sigma)
+        times(D, phi, climb)
+        transposed_times(D, omega, turned)
+        transposed_times(J, pull, inside)
+        for j in range(n):
+            mean[j] += omega[j] / substeps
+            wanted = c3 * climb[j] - inside[j] + (1.0 - c2) * omega[j]
+            omega[j] += h * (min(max(wanted, seen.lower[j]), seen.upper[j]) - omega[j])
+        for i in range(9):
+            phi[i] += h * (sign * (c3 * turned[i] - c1 * B_gap[i]) + B_sigma[i])
+            sigma[i] -= h * B_phi[i]
+        for i in range(m):
+            lam[i] += h * gap[i]

@@ -9,10 +9,10 @@ from pydantic import Field, NonNegativeFloat, NonNegativeInt
 
 from surgsim.catalog import PartConfig
 from surgsim.compiled import compiled
+from surgsim.control.failure import ControlFailure
 from surgsim.control.manipulability import velocity_product_accelerations
 from surgsim.control.null_space import least_velocity
 from surgsim.control.problem import (
-    ControlFailure,
     Resolution,
     VelocityProblem,
     bounded_resolution,

@@ -1,7 +1,6 @@
 """VPRNN: the varying-parameter recurrent neural network of the hierarchical-control paper (eq. 5-29)."""
 
 import math
-from dataclasses import dataclass
 from typing import Annotated, Literal
 
 import numpy as np
@@ -11,16 +10,30 @@ from pydantic import Field, NonNegativeFloat, PositiveFloat
 from surgsim.catalog import PartConfig
 from surgsim.compiled import compiled
 from surgsim.control.manipulability import diamond, jacobian_gradient
-from surgsim.control.problem import ControlFailure, Resolution, VelocityProblem, bounded_resolution
-from surgsim.control.rcm import rcm_cross_form
-from surgsim.errors import Outcome
-from surgsim.linalg import solve
+from surgsim.control.resolvers.base import KernelResolver
+from surgsim.control.resolvers.rows import answer
 from surgsim.models.arm import ArmModel
-from surgsim.spatial import cross
+from surgsim.tick.algebra import (
+    back_substitute,
+    back_substitute_rows,
+    cross,
+    dot,
+    eliminate,
+    factor,
+    outer_product,
+    times,
+    transposed_times,
+)
+from surgsim.tick.arrays import Resolved, Seen
+from surgsim.tick.status import DIVERGED, GOES_ON, RANK_LOST
 
 Array = NDArray[np.float64]
 _DIVERGED = 1e12
-_NO_ROWS = np.zeros((0, 7))
+_MOST_ROWS = 6
+_EXACT_MEMORY = 25 + _MOST_ROWS
+
+H0, H1, H2, H3, H4, K1, K2, BETA, CAP, BOUND, EULER, CROSS = range(12)
+"""Places of the gains; EULER and CROSS are 0 or 1."""
 
 
 class VprnnConfig(PartConfig):
@@ -55,233 +68,285 @@ class VprnnConfig(PartConfig):
     integration: Literal["exact", "euler"] = "exact"
     rcm_rows: Literal["normal", "cross"] = "normal"
 
-    def build(self, arm: ArmModel) -> "Vprnn":
-        """The resolver."""
-        return Vprnn(self)
+    def build(self, arm: ArmModel) -> KernelResolver:
+        """The resolver; memory delta of eq. (26), or z, l and W of the step before in the Euler form."""
+        bound = math.inf if self.activation_bound is None else self.activation_bound
+        n = arm.limits.q_min.size + 21 + _MOST_ROWS - 3
+        return KernelResolver(
+            kernel=vprnn,
+            arm=arm,
+            gains=np.array(
+                [
+                    self.h0,
+                    self.h1,
+                    self.h2,
+                    self.h3,
+                    self.h4,
+                    self.k1,
+                    self.k2,
+                    self.beta,
+                    self.exponent_cap,
+                    bound,
+                    self.integration == "euler",
+                    self.rcm_rows == "cross",
+                ],
+                dtype=np.float64,
+            ),
+            memory_size=_EXACT_MEMORY if self.integration == "exact" else n * (n + 2),
+            failures={DIVERGED: "VPRNN: a joint velocity exceeds 1e12 rad/s"},
+        )
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class VprnnMemory:
-    """State of the network.
-
-    Attributes:
-        delta: Error W z - l of eq. (26) (29,); None before the first exact step.
-        z: Decision vector [q', psi, lambda1, lambda2, lambda3], kept by the Euler form alone.
-        W: W of the step before, kept by the Euler form alone.
-        l: l of the step before, kept by the Euler form alone.
-    """
-
-    delta: Array | None = None
-    z: Array | None = None
-    W: Array | None = None
-    l: Array | None = None  # noqa: E741 - the paper's name
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Terms:
-    """Building blocks of W and l at one state.
-
-    Attributes:
-        J: Tip Jacobian J_T (3, 7).
-        J_rcm: RCM rows (r, 7), r = 2, 3 or 0.
-        D: J_T <> h (7, 9) of eq. (18).
-        A: J_T J_T^T (3, 3).
-        v_d: Right side of the tip rows (3,), eq. (20).
-        v_rcm: Right side of the RCM rows (r,).
-    """
-
-    J: Array
-    J_rcm: Array
-    D: Array
-    A: Array
-    v_d: Array
-    v_rcm: Array
-
-
-class Vprnn:
+@compiled
+def vprnn(gains: Array, seen: Seen, memory: Array, out: Resolved) -> int:
     """Solves W z = l, eq. (25), through the error dynamics delta' = -beta exp(t) phi(delta), eq. (27).
 
     In the exact form delta is stepped in closed form, saturated range included, and z follows from
     W z = l + delta. W is block-structured: psi comes from (I x J J^T) psi = vec(I) + delta_5, and
-    [q', lambda1, lambda2] from a KKT system of 12 rows; lambda3 does not feed back and is not needed.
-    z starts at zero, so delta starts at -l.
+    [q', lambda1, lambda2] from a system of n + m rows; lambda3 does not feed back and is not needed.
+    z starts at zero, so delta starts at -l. The Euler form integrates eq. (29) literally.
 
     Source: VPRNN paper, section III; eq. (20), (21), (25)-(29). A cap on exp(t) and the projection on two
     RCM rows are ours: the paper's W is singular with the three cross-product rows.
     """
-
-    def __init__(self, config: VprnnConfig) -> None:
-        self._c = config
-        self._bound = math.inf if config.activation_bound is None else config.activation_bound
-        self._solve = _rank_revealing_solve if config.rcm_rows == "cross" else solve
-
-    def start(self, problem: VelocityProblem) -> VprnnMemory:
-        """Memory with z = 0."""
-        return VprnnMemory()
-
-    def step(self, problem: VelocityProblem, memory: VprnnMemory) -> tuple[Resolution, VprnnMemory]:
-        """One control period of the network, and its joint velocities projected on Omega."""
-        J_rcm, v_d, v_rcm = self._rows(problem)
-        J = np.concatenate((problem.kin.Jv_WT, J_rcm))
-        if self._c.integration == "exact":
-            qdot, memory = self._step_exact(problem, J, v_d, v_rcm, memory)
-        else:
-            qdot, memory = self._step_euler(self.terms(problem), problem, memory)
-        if not np.abs(qdot).max() < _DIVERGED:
-            raise ControlFailure(Outcome.DIVERGED, "VPRNN: a joint velocity exceeds 1e12 rad/s")
-        return bounded_resolution(problem, qdot, J, np.concatenate((v_d, v_rcm))), memory
-
-    def _rows(self, problem: VelocityProblem) -> tuple[Array, Array, Array]:
-        """J_rcm (r, 7), v_d (3,) and v_rcm (r,) of eq. (20)."""
-        v_d = problem.command.v_WTd - self._c.k1 * problem.tip_error
-        if problem.rcm is None:
-            return _NO_ROWS, v_d, _NO_ROWS[:, 0]
-        if self._c.rcm_rows == "cross":
-            error, J_rcm = rcm_cross_form(problem.kin, problem.p_WC)
-            return J_rcm, v_d, cross(problem.kin.R_WT[:, 2], problem.v_WC) - self._c.k2 * error
-        return problem.rcm.jacobian, v_d, problem.rcm.trocar_velocity - self._c.k2 * problem.rcm.error
-
-    def terms(self, problem: VelocityProblem) -> Terms:
-        """Building blocks of W and l."""
-        J = problem.kin.Jv_WT
-        J_rcm, v_d, v_rcm = self._rows(problem)
-        D = diamond(J, jacobian_gradient(J, problem.kin.z_W))
-        return Terms(J=J, J_rcm=J_rcm, D=D, A=J @ J.T, v_d=v_d, v_rcm=v_rcm)
-
-    def system(self, t: Terms) -> tuple[Array, Array]:
-        """W (7 + 18 + 3 + r) square and l of eq. (25)."""
-        c, r = self._c, t.J_rcm.shape[0]
-        B = np.kron(np.eye(3), t.A)
-        n = 28 + r
-        q, psi, l1, l2, l3 = slice(0, 7), slice(7, 16), slice(16, 19), slice(19, 19 + r), slice(19 + r, n)
-        W, l = np.zeros((n, n)), np.zeros(n)  # noqa: E741
-        W[q, q] = c.h1 * np.eye(7) + c.h2 * t.J.T @ t.J + c.h3 * t.J_rcm.T @ t.J_rcm
-        W[q, psi], W[q, l1], W[q, l2] = -c.h0 * t.D, -t.J.T, -t.J_rcm.T
-        W[psi, q], W[psi, psi], W[psi, l3] = -c.h0 * t.D.T, c.h4 * B @ B, -B
-        W[l1, q], W[l2, q], W[l3, psi] = t.J, t.J_rcm, B
-        l[q] = c.h2 * t.J.T @ t.v_d + c.h3 * t.J_rcm.T @ t.v_rcm
-        l[psi] = c.h4 * B @ np.eye(3).ravel()
-        l[l1], l[l2], l[l3] = t.v_d, t.v_rcm, np.eye(3).ravel()
-        return W, l
-
-    def decay(self, delta: Array, t_s: float, dt_s: float) -> Array:
-        """Error delta after one period: the closed form of eq. (27) with the activation (28)."""
-        return _decay(delta, self._progress(t_s, dt_s), self._bound)
-
-    def _progress(self, t_s: float, dt_s: float) -> float:
-        """The decay exponent: beta * integral of min(exp(t), exp(cap)) over one period."""
-        return self._c.beta * _capped_exponential_integral(t_s, t_s + dt_s, self._c.exponent_cap)
-
-    def recover_qdot(self, t: Terms, rhs: Array) -> Array:
-        """Joint velocity q' (7,) of W z = rhs through the block structure of W.
-
-        Raises:
-            numpy.linalg.LinAlgError: If W is singular and the rows are `normal`.
-        """
-        c = self._c
-        K, b = _kkt(np.concatenate((t.J, t.J_rcm)), t.A, t.D, rhs, c.h0, c.h1, c.h2, c.h3)
-        return self._solve(K, b)[:7]
-
-    def _step_exact(
-        self, p: VelocityProblem, J: Array, v_d: Array, v_rcm: Array, memory: VprnnMemory
-    ) -> tuple[Array, VprnnMemory]:
-        c = self._c
-        delta = _NO_ROWS[:, 0] if memory.delta is None else memory.delta
-        tau = self._progress(p.t_s, p.dt_s)
-        K, b, delta = _exact_system(
-            J, p.kin.z_W, v_d, v_rcm, delta, tau, self._bound, c.h0, c.h1, c.h2, c.h3, c.h4
-        )
-        return self._solve(K, b)[:7], VprnnMemory(delta=delta)
-
-    def _step_euler(self, t: Terms, p: VelocityProblem, memory: VprnnMemory) -> tuple[Array, VprnnMemory]:
-        """Explicit Euler of eq. (29), z' = W^-1 (-W' z + l' - beta exp(t) phi(W z - l)); W', l' backward."""
-        W, l = self.system(t)  # noqa: E741
-        z = np.zeros(len(l)) if memory.z is None else memory.z
-        W_old = W if memory.W is None else memory.W
-        l_old = l if memory.l is None else memory.l
-        gain = self._c.beta * math.exp(min(p.t_s, self._c.exponent_cap))
-        delta = W @ z - l
-        phi = np.clip(delta, -self._bound, self._bound)
-        z_dot = self._solve(W, (l - l_old - (W - W_old) @ z) / p.dt_s - gain * phi)
-        z = z + p.dt_s * z_dot
-        return z[:7].copy(), VprnnMemory(z=z, W=W, l=l)
+    J, v = network_rows(gains, seen)
+    qdot = np.empty(seen.q.size)
+    if gains[EULER] != 0.0:
+        solved = _step_euler(gains, seen, memory, J, v, qdot)
+    else:
+        solved = _step_exact(gains, seen, memory, J, v, qdot)
+    if not solved:
+        return RANK_LOST
+    for j in range(qdot.size):
+        if not abs(qdot[j]) < _DIVERGED:
+            return DIVERGED
+    answer(seen, qdot, J, v, out)
+    return GOES_ON
 
 
 @compiled
-def _decay(delta: Array, tau: float, bound: float) -> Array:
-    """The linear range decays as exp(-tau); a saturated entry falls at its bound's rate until then."""
-    out = np.empty(delta.size)
+def network_rows(gains: Array, seen: Seen) -> tuple[Array, Array]:
+    """Rows [J_T; J_rcm] (m, n) and right side [v_d; v_rcm] (m,) of eq. (20), with the RCM rows of the form."""
+    n, wide = seen.q.size, gains[CROSS] != 0.0
+    r = 0 if seen.rows == 0 else (3 if wide else 2)
+    J, v = np.empty((3 + r, n)), np.empty(3 + r)
+    for i in range(3):
+        J[i] = seen.Jv_WT[i]
+        v[i] = seen.v_WTd[i] - gains[K1] * (seen.p_WT[i] - seen.p_WTd[i])
+    if r == 2:
+        for i in range(2):
+            J[3 + i] = seen.J_rcm[i]
+            v[3 + i] = seen.rcm_velocity[i] - gains[K2] * seen.rcm_error[i]
+    elif r == 3:
+        _cross_rows(gains[K2], seen, J[3:], v[3:])
+    return J, v
+
+
+@compiled
+def _cross_rows(k2: float, seen: Seen, J: Array, v: Array) -> None:
+    """Rows of E_rcm = d x (p - C), eq. (2): dE = [d]x Jv + [r]x [d]x Jw; their right side d x C' - k2 E."""
+    d, r, E, a, b = np.empty(3), np.empty(3), np.empty(3), np.empty(3), np.empty(3)
+    for i in range(3):
+        d[i] = seen.R_WT[i, 2]
+        r[i] = seen.p_WT[i] - seen.p_WC[i]
+    cross(d, r, E)
+    cross(d, seen.v_WC, a)
+    for i in range(3):
+        v[i] = a[i] - k2 * E[i]
+    for j in range(J.shape[1]):
+        cross(d, np.ascontiguousarray(seen.Jv_WT[:, j]), a)
+        cross(d, np.ascontiguousarray(seen.Jw_WT[:, j]), b)
+        cross(r, b, b)
+        for i in range(3):
+            J[i, j] = a[i] + b[i]
+
+
+@compiled
+def right_side(gains: Array, J: Array, v: Array, A: Array, l: Array) -> None:  # noqa: E741
+    """Fill l (n + 18 + m,) of eq. (25); A = J_T J_T^T."""
+    n, m = J.shape[1], v.size
+    for j in range(n):
+        s = 0.0
+        for k in range(m):
+            s += (gains[H2] if k < 3 else gains[H3]) * J[k, j] * v[k]
+        l[j] = s
+    for i in range(3):
+        for k in range(3):
+            l[n + 3 * i + k] = gains[H4] * A[i, k]
+            l[n + 9 + m + 3 * i + k] = 1.0 if i == k else 0.0
+    for k in range(m):
+        l[n + 9 + k] = v[k]
+
+
+@compiled
+def _step_exact(gains: Array, seen: Seen, memory: Array, J: Array, v: Array, qdot: Array) -> bool:
+    """One period of the network in closed form; False where its system is singular."""
+    n, m = J.shape[1], v.size
+    A, right = np.empty((3, 3)), np.empty(n + 18 + m)
+    outer_product(seen.Jv_WT, seen.Jv_WT, A)
+    right_side(gains, J, v, A, right)
+    delta = memory[: right.size]
+    if seen.first != 0:
+        for i in range(right.size):
+            delta[i] = -right[i]
+    t = seen.t_s
+    decay(delta, gains[BETA] * exponential_integral(t, t + seen.dt_s, gains[CAP]), gains[BOUND])
+    for i in range(right.size):
+        right[i] += delta[i]
+    D = diamond(seen.Jv_WT, jacobian_gradient(seen.Jv_WT, seen.z_W))
+    return recover_qdot(gains, J, A, D, right, qdot)
+
+
+@compiled
+def decay(delta: Array, progress: float, bound: float) -> None:
+    """The error after one period, in place: the closed form of eq. (27) with the activation (28).
+
+    The linear range decays as exp(-progress), progress = beta times the integral of exp(t); a saturated entry
+    falls at its bound's rate until then.
+    """
+    factor_ = math.exp(-progress)
     for i in range(delta.size):
         size = abs(delta[i])
-        until = max(size - bound, 0.0) / bound if bound < np.inf else 0.0
-        left = min(size, bound) * np.exp(-(tau - until)) if until < tau else size - bound * tau
-        out[i] = left if delta[i] > 0.0 else -left
-    return out
+        if size <= bound:
+            left = size * factor_
+        else:
+            until = (size - bound) / bound
+            left = bound * math.exp(-(progress - until)) if until < progress else size - bound * progress
+        delta[i] = left if delta[i] > 0.0 else -left
 
 
 @compiled
-def _kkt(
-    J: Array, A: Array, D: Array, rhs: Array, h0: float, h1: float, h2: float, h3: float
-) -> tuple[Array, Array]:
-    """Rows of W z = rhs that hold q', lambda1 and lambda2, with psi solved from the last rows.
-
-    J stacks J_T on J_rcm, (3 + r, 7).
-    """
-    m = J.shape[0]
-    columns = rhs[16 + m :].copy().reshape(3, 3).T
-    psi = np.linalg.solve(A, columns).T.copy().ravel()
-    K = np.zeros((7 + m, 7 + m))
-    for i in range(7):
-        for j in range(i, 7):
-            for k in range(m):
-                K[i, j] += (h2 if k < 3 else h3) * J[k, i] * J[k, j]
-            K[j, i] = K[i, j]
-        K[i, i] += h1
-        for k in range(m):
-            K[i, 7 + k] = -J[k, i]
-            K[7 + k, i] = J[k, i]
-    b = np.empty(7 + m)
-    b[:7] = rhs[:7] + h0 * (D @ psi)
-    b[7:] = rhs[16 : 16 + m]
-    return K, b
-
-
-@compiled
-def _exact_system(
-    J: Array,
-    z: Array,
-    v_d: Array,
-    v_rcm: Array,
-    delta: Array,
-    tau: float,
-    bound: float,
-    h0: float,
-    h1: float,
-    h2: float,
-    h3: float,
-    h4: float,
-) -> tuple[Array, Array, Array]:
-    """The KKT system of one exact step, and delta after it; an empty `delta` stands for z = 0."""
-    J_T = J[:3]
-    A = J_T @ J_T.T
-    m = J.shape[0]
-    right = np.empty(25 + m)
-    right[:7] = h2 * (v_d @ J_T) + h3 * (v_rcm @ J[3:])
-    right[7:16] = h4 * A.ravel()
-    right[16:19] = v_d
-    right[19 : 16 + m] = v_rcm
-    right[16 + m :] = np.eye(3).ravel()
-    delta = _decay(-right if delta.size == 0 else delta, tau, bound)
-    K, b = _kkt(J, A, diamond(J_T, jacobian_gradient(J_T, z)), right + delta, h0, h1, h2, h3)
-    return K, b, delta
-
-
-def _rank_revealing_solve(A: Array, b: Array) -> Array:
-    return np.asarray(np.linalg.lstsq(A, b, rcond=1e-10)[0])
-
-
-def _capped_exponential_integral(start: float, end: float, cap: float) -> float:
+def exponential_integral(start: float, end: float, cap: float) -> float:
     """Integral of min(exp(t), exp(cap)) from `start` to `end`."""
     grows_to = min(end, cap)
     grown = math.exp(grows_to) - math.exp(start) if start < grows_to else 0.0
     return grown + math.exp(cap) * max(end - max(start, cap), 0.0)
+
+
+@compiled
+def recover_qdot(gains: Array, J: Array, A: Array, D: Array, rhs: Array, qdot: Array) -> bool:
+    """Joint velocity q' (n,) of W z = rhs through the block structure of W; False where W is singular.
+
+        psi = vec(A^-1 Rhs_5),  P = h1 I + h2 J_T^T J_T + h3 J_rcm^T J_rcm,  b = rhs_q + h0 D psi
+        (J P^-1 J^T) lambda = rhs_J - J P^-1 b,  q' = P^-1 (b + J^T lambda)
+
+    The three cross-product rows have rank 2: their least-squares solution is taken.
+    """
+    n, m = J.shape[1], J.shape[0]
+    L, X = A.copy(), np.empty((3, 3))
+    if not factor(L):
+        return False
+    for i in range(3):
+        for k in range(3):
+            X[i, k] = rhs[n + 9 + m + 3 * i + k]
+    back_substitute_rows(L, X)
+    P, b = np.empty((n, n)), np.empty(n)
+    for i in range(n):
+        s = rhs[i]
+        for k in range(9):
+            s += gains[H0] * D[i, k] * X[k // 3, k % 3]
+        b[i] = s
+        for j in range(i + 1):
+            s = gains[H1] if i == j else 0.0
+            for k in range(m):
+                s += (gains[H2] if k < 3 else gains[H3]) * J[k, i] * J[k, j]
+            P[i, j] = s
+            P[j, i] = s
+    if gains[CROSS] != 0.0 and m > 3:
+        return _least_squares(P, J, b, rhs[n + 9 : n + 9 + m], qdot)
+    if not factor(P):
+        return False
+    Y, S, gap = J.copy(), np.empty((m, m)), np.empty(m)
+    back_substitute_rows(P, Y)
+    outer_product(J, Y, S)
+    if not factor(S):
+        return False
+    for k in range(m):
+        gap[k] = rhs[n + 9 + k] - dot(Y[k], b)
+    back_substitute(S, gap)
+    transposed_times(J, gap, qdot)
+    for j in range(n):
+        qdot[j] += b[j]
+    back_substitute(P, qdot)
+    return True
+
+
+@compiled
+def _least_squares(P: Array, J: Array, b: Array, v: Array, qdot: Array) -> bool:
+    """Q' of [P -J^T; J 0] [q'; lambda] = [b; v] in the least-squares sense, singular values cut at 1e-10."""
+    n, m = J.shape[1], J.shape[0]
+    K, right = np.zeros((n + m, n + m)), np.empty(n + m)
+    K[:n, :n] = P
+    K[:n, n:] = -J.T
+    K[n:, :n] = J
+    right[:n] = b
+    right[n:] = v
+    if not np.isfinite(K).all() or not np.isfinite(right).all():
+        return False
+    qdot[:] = np.linalg.lstsq(K, right, 1e-10)[0][:n]
+    return True
+
+
+@compiled
+def system(gains: Array, J: Array, A: Array, D: Array) -> Array:
+    """W (n + 18 + m) square of eq. (25), for z = [q', psi, lambda1, lambda2, lambda3]."""
+    n, m = J.shape[1], J.shape[0]
+    W = np.zeros((n + 18 + m, n + 18 + m))
+    AA = np.empty((3, 3))
+    outer_product(A, A, AA)
+    tail = n + 9 + m
+    for i in range(n):
+        for j in range(n):
+            s = gains[H1] if i == j else 0.0
+            for k in range(m):
+                s += (gains[H2] if k < 3 else gains[H3]) * J[k, i] * J[k, j]
+            W[i, j] = s
+        for k in range(9):
+            W[i, n + k] = W[n + k, i] = -gains[H0] * D[i, k]
+        for k in range(m):
+            W[i, n + 9 + k] = -J[k, i]
+            W[n + 9 + k, i] = J[k, i]
+    for block in range(3):
+        for i in range(3):
+            for k in range(3):
+                row, column = 3 * block + i, 3 * block + k
+                W[n + row, n + column] = gains[H4] * AA[i, k]
+                W[n + row, tail + column] = -A[i, k]
+                W[tail + row, n + column] = A[i, k]
+    return W
+
+
+@compiled
+def _step_euler(gains: Array, seen: Seen, memory: Array, J: Array, v: Array, qdot: Array) -> bool:
+    """Explicit Euler of eq. (29), z' = W^-1 (-W' z + l' - beta exp(t) phi(W z - l)); W', l' backward."""
+    n, m = J.shape[1], v.size
+    size = n + 18 + m
+    z, l_old = memory[:size], memory[size : 2 * size]
+    W_old = memory[2 * size : (2 + size) * size].reshape((size, size))
+    A, l = np.empty((3, 3)), np.empty(size)  # noqa: E741 - the paper's name
+    outer_product(seen.Jv_WT, seen.Jv_WT, A)
+    right_side(gains, J, v, A, l)
+    W = system(gains, J, A, diamond(seen.Jv_WT, jacobian_gradient(seen.Jv_WT, seen.z_W)))
+    if seen.first != 0:
+        l_old[:] = l
+        W_old[:] = W
+    dt, bound = seen.dt_s, gains[BOUND]
+    gain = gains[BETA] * math.exp(min(seen.t_s, gains[CAP]))
+    rate, last = np.empty(size), np.empty(size)
+    times(W, z, rate)
+    times(W_old, z, last)
+    for i in range(size):
+        phi = min(max(rate[i] - l[i], -bound), bound)
+        rate[i] = (l[i] - l_old[i] - rate[i] + last[i]) / dt - gain * phi
+    l_old[:] = l
+    W_old[:] = W
+    if gains[CROSS] != 0.0 and m > 3:
+        if not np.isfinite(W).all() or not np.isfinite(rate).all():
+            return False
+        rate[:] = np.linalg.lstsq(W, rate, 1e-10)[0]
+    elif not eliminate(W, rate):
+        return False
+    for i in range(size):
+        z[i] += dt * rate[i]
+    qdot[:] = z[:n]
+    return True

@@ -1,19 +1,26 @@
-"""Interface of a torque-level law."""
+"""Interface of a torque-level law: a Python object, or a kernel of the compiled loop."""
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Protocol, TypeVar
+from typing import Any, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from surgsim.control.failure import ControlFailure, failure_of
 from surgsim.control.problem import Resolution
 from surgsim.control.rcm import Rcm
-from surgsim.models.arm import Dynamics, Kinematics
+from surgsim.control.seen import dynamics_of, fill_kinematics, fill_rcm_of, kinematics_of, new_seen, rcm_of
+from surgsim.models.arm import ArmModel, Dynamics, Kinematics
 from surgsim.plant.state import NO_FORCE
 from surgsim.tasks.base import TipCommand
+from surgsim.tasks.command import command_of, fill_command_of
+from surgsim.tick.arrays import Seen
+from surgsim.tick.status import GOES_ON
 
 Array = NDArray[np.float64]
 Memory = TypeVar("Memory")
+TorqueKernel = Callable[[Array, Seen, Array, Array], int]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -23,9 +30,9 @@ class TorqueProblem:
     Attributes:
         t_s: Time since the controller started [s].
         dt_s: Control period [s].
-        q: Measured joint positions (7,) [rad].
-        v: Measured joint velocities (7,) [rad/s].
-        tau_measured: Joint torques that acted over the last period (7,) [N m].
+        q: Measured joint positions (n,) [rad].
+        v: Measured joint velocities (n,) [rad/s].
+        tau_measured: Joint torques that acted over the last period (n,) [N m].
         kin: Nominal kinematics at `q`.
         dyn: Nominal dynamics at `q`, `v`.
         rcm: RCM error and Jacobian at `q`, or None without a trocar.
@@ -34,7 +41,7 @@ class TorqueProblem:
         a_WC: Trocar acceleration (3,) [m/s^2].
         command: Desired tip motion.
         resolution: The resolver's answer.
-        q_ref: Joint reference, integrated from the resolver's velocities (7,) [rad].
+        q_ref: Joint reference, integrated from the resolver's velocities (n,) [rad].
         f_T: Measured force of the surroundings on the tip (3,) [N].
     """
 
@@ -68,10 +75,89 @@ class TorqueLaw(Protocol[Memory]):
         ...
 
     def torque(self, problem: TorqueProblem, memory: Memory) -> tuple[Array, Memory]:
-        """Terms of the torque as rows (len(terms), 7) [N m], to be summed, and the next state.
+        """Terms of the torque as rows (len(terms), n) [N m], to be summed, and the next state.
 
         Raises:
             ControlFailure: If there is no answer.
             numpy.linalg.LinAlgError: If the task Jacobian has lost rank.
         """
         ...
+
+
+@dataclass(frozen=True, kw_only=True)
+class KernelTorqueLaw:
+    """A torque law that is a kernel: the loop calls the kernel, this calls it from Python.
+
+    Attributes:
+        kernel: status = kernel(gains, seen, memory, out); compiled, or plain Python.
+        arm: The nominal arm.
+        terms: Names of the terms, in the order of the rows of `out`.
+        gains: The law's numbers, laid out as the kernel says.
+        memory_size: Length of its memory, all zeros before the first tick.
+        failures: What each status of the kernel means, for the person who reads the outcome.
+    """
+
+    kernel: TorqueKernel
+    arm: ArmModel
+    terms: tuple[str, ...]
+    gains: Array
+    memory_size: int = 0
+    failures: Mapping[int, str] = field(default_factory=dict)
+
+    def start(self, problem: TorqueProblem) -> None:
+        """The kernel makes its own memory at the first tick."""
+
+    def torque(self, problem: TorqueProblem, memory: Array | None) -> tuple[Array, Array]:
+        """Terms of the torque, and the kernel's memory; None is that before the first tick.
+
+        Raises:
+            ControlFailure: If the kernel has no answer.
+        """
+        seen = seen_of_torque(problem, self.arm)
+        seen.first = memory is None
+        after = np.zeros(self.memory_size) if memory is None else memory.copy()
+        out = np.zeros((len(self.terms), seen.q.size))
+        status = self.kernel(self.gains, seen, after, out)
+        if status != GOES_ON:
+            raise self.failure(status, seen)
+        return out, after
+
+    def failure(self, status: int, seen: Seen) -> ControlFailure:
+        """Why there is no answer."""
+        data = {"q": seen.q.copy(), "v": seen.v.copy(), "M": seen.M.copy()}
+        return failure_of(status, self.failures, data)
+
+
+def seen_of_torque(p: TorqueProblem, arm: ArmModel) -> Any:
+    """What a torque law is given, as a record."""
+    seen = new_seen(arm, dt_s=p.dt_s, has_trocar=p.rcm is not None)
+    seen.t_s = p.t_s
+    seen.q[:], seen.v[:], seen.tau[:], seen.f_T[:] = p.q, p.v, p.tau_measured, p.f_T
+    fill_kinematics(seen, p.kin)
+    seen.M[:], seen.bias[:] = p.dyn.mass_matrix, p.dyn.bias
+    fill_rcm_of(seen, p.rcm)
+    seen.p_WC[:], seen.v_WC[:], seen.a_WC[:] = p.p_WC, p.v_WC, p.a_WC
+    fill_command_of(seen, p.command)
+    seen.qdot_ref[:], seen.q_ref[:] = p.resolution.qdot, p.q_ref
+    return seen
+
+
+def torque_problem_of(seen: Seen, resolution: Resolution) -> TorqueProblem:
+    """What a torque law in Python is given."""
+    return TorqueProblem(
+        t_s=float(seen.t_s),
+        dt_s=float(seen.dt_s),
+        q=seen.q.copy(),
+        v=seen.v.copy(),
+        tau_measured=seen.tau.copy(),
+        kin=kinematics_of(seen),
+        dyn=dynamics_of(seen),
+        rcm=rcm_of(seen),
+        p_WC=seen.p_WC.copy(),
+        v_WC=seen.v_WC.copy(),
+        a_WC=seen.a_WC.copy(),
+        command=command_of(seen),
+        resolution=resolution,
+        q_ref=seen.q_ref.copy(),
+        f_T=seen.f_T.copy(),
+    )

@@ -8,9 +8,20 @@ from pydantic import NonNegativeFloat
 
 from surgsim.catalog import PartConfig
 from surgsim.compiled import compiled
-from surgsim.control.torque_laws.base import TorqueProblem
+from surgsim.control.torque_laws.base import KernelTorqueLaw
 from surgsim.models.arm import ArmModel
 from surgsim.models.config import Vec3, Vec7
+from surgsim.tick.algebra import (
+    back_substitute,
+    back_substitute_rows,
+    dot,
+    factor,
+    outer_product,
+    times,
+    transposed_times,
+)
+from surgsim.tick.arrays import Seen
+from surgsim.tick.status import GOES_ON, RANK_LOST
 
 Array = NDArray[np.float64]
 
@@ -35,13 +46,23 @@ class HierarchicalImpedanceConfig(PartConfig):
     joint_stiffness_nm_per_rad: Vec7 = (80.0, 120.0, 60.0, 30.0, 20.0, 10.0, 10.0)
     joint_damping_nm_s_per_rad: Vec7 = (6.0, 10.0, 5.0, 3.0, 2.0, 1.0, 1.0)
 
-    def build(self, arm: ArmModel) -> "HierarchicalImpedance":
-        """The law."""
-        return HierarchicalImpedance(self)
+    def build(self, arm: ArmModel) -> KernelTorqueLaw:
+        """The law; gains K_X (3,), D_X (3,), K_N, D_N, K_N2 (n,), D_N2 (n,)."""
+        gains = [
+            *self.tip_stiffness_n_per_m,
+            *self.tip_damping_n_s_per_m,
+            self.rcm_stiffness_n_per_m,
+            self.rcm_damping_n_s_per_m,
+            *self.joint_stiffness_nm_per_rad,
+            *self.joint_damping_nm_s_per_rad,
+        ]
+        terms = ("tip", "rcm", "joint", "bias")
+        return KernelTorqueLaw(kernel=hierarchical_impedance, arm=arm, terms=terms, gains=np.array(gains))
 
 
-class HierarchicalImpedance:
-    """tau = J_T^T F_T + N_1 J_rcm^T F_rcm + N_2 tau_J + bias.
+@compiled
+def hierarchical_impedance(gains: Array, seen: Seen, memory: Array, out: Array) -> int:
+    """Tau = J_T^T F_T + N_1 J_rcm^T F_rcm + N_2 tau_J + bias; rows tip, rcm, joint, bias (4, n) [N m].
 
         F_T   = K_X (p_d - p) + D_X (p_d' - p')
         F_rcm = -K_N e - D_N e'
@@ -54,87 +75,51 @@ class HierarchicalImpedance:
     Source: gains from Table I of the VPRNN paper, which prints no torque law; the law is the hierarchical
     operational-space formulation that it cites (Khatib 1987; Sandoval et al. 2017; Su et al. 2019).
     """
-
-    terms = ("tip", "rcm", "joint", "bias")
-
-    def __init__(self, config: HierarchicalImpedanceConfig) -> None:
-        self._K_X = np.array(config.tip_stiffness_n_per_m)
-        self._D_X = np.array(config.tip_damping_n_s_per_m)
-        self._K_N = config.rcm_stiffness_n_per_m
-        self._D_N = config.rcm_damping_n_s_per_m
-        self._K_N2 = np.array(config.joint_stiffness_nm_per_rad)
-        self._D_N2 = np.array(config.joint_damping_nm_s_per_rad)
-
-    def start(self, problem: TorqueProblem) -> None:
-        """The law has no state."""
-
-    def torque(self, problem: TorqueProblem, memory: None) -> tuple[Array, None]:
-        """Rows tip, rcm, joint, bias (4, 7) [N m]."""
-        p, kin, command, rcm = problem, problem.kin, problem.command, problem.rcm
-        return _hierarchy(
-            p.dyn.mass_matrix,
-            p.dyn.bias,
-            kin.Jv_WT,
-            command.p_WTd - kin.p_WT,
-            command.v_WTd,
-            _NO_ROWS if rcm is None else rcm.jacobian,
-            _NO_ROWS[:, 0] if rcm is None else rcm.error,
-            _NO_ROWS[:, 0] if rcm is None else rcm.trocar_velocity,
-            p.q_ref - p.q,
-            p.resolution.qdot,
-            p.v,
-            self._K_X,
-            self._D_X,
-            self._K_N,
-            self._D_N,
-            self._K_N2,
-            self._D_N2,
-        ), None
-
-
-_NO_ROWS = np.zeros((0, 7))
+    n, r = seen.q.size, seen.rows
+    J, L = np.empty((3 + r, n)), seen.M.copy()
+    J[:3] = seen.Jv_WT
+    J[3:] = seen.J_rcm
+    JMinv = J.copy()
+    if not factor(L):
+        return RANK_LOST
+    back_substitute_rows(L, JMinv)
+    force, rate = np.empty(3), np.empty(3)
+    times(seen.Jv_WT, seen.v, rate)
+    for i in range(3):
+        force[i] = gains[i] * (seen.p_WTd[i] - seen.p_WT[i]) + gains[3 + i] * (seen.v_WTd[i] - rate[i])
+    transposed_times(seen.Jv_WT, force, out[0])
+    for i in range(r):
+        e_dot = dot(seen.J_rcm[i], seen.v) - seen.rcm_velocity[i]
+        force[i] = -gains[6] * seen.rcm_error[i] - gains[7] * e_dot
+    transposed_times(seen.J_rcm, force[:r], out[1])
+    for j in range(n):
+        spring = gains[8 + j] * (seen.q_ref[j] - seen.q[j])
+        out[2, j] = spring + gains[8 + n + j] * (seen.qdot_ref[j] - seen.v[j])
+        out[3, j] = seen.bias[j]
+    if not (project_torque(J[:3], JMinv[:3], out[1]) and project_torque(J, JMinv, out[2])):
+        return RANK_LOST
+    return GOES_ON
 
 
 @compiled
-def _hierarchy(
-    M: Array,
-    bias: Array,
-    J_T: Array,
-    tip_gap: Array,
-    v_d: Array,
-    J_r: Array,
-    error: Array,
-    trocar_velocity: Array,
-    joint_gap: Array,
-    qdot_ref: Array,
-    v: Array,
-    K_X: Array,
-    D_X: Array,
-    K_N: float,
-    D_N: float,
-    K_N2: Array,
-    D_N2: Array,
-) -> Array:
-    """Rows tip, rcm, joint, bias of the torque (4, 7) [N m]."""
-    F_T = K_X * tip_gap + D_X * (v_d - J_T @ v)
-    F_r = -K_N * error - D_N * (J_r @ v - trocar_velocity)
-    J = np.concatenate((J_T, J_r))
-    JMinv = np.ascontiguousarray(np.linalg.solve(M, J.T).T)
-    out = np.empty((4, 7))
-    out[0] = F_T @ J_T
-    out[1] = null_space_torque(J_T, JMinv[:3], F_r @ J_r)
-    out[2] = null_space_torque(J, JMinv, K_N2 * joint_gap + D_N2 * (qdot_ref - v))
-    out[3] = bias
-    return out
+def project_torque(J: Array, JMinv: Array, tau: Array) -> bool:
+    """`tau` (n,) [N m] becomes (I - J^T (J M^-1 J^T)^-1 J M^-1) tau; False where J has lost rank.
 
-
-@compiled
-def null_space_torque(J: Array, JMinv: Array, tau: Array) -> Array:
-    """(I - J^T (J M^-1 J^T)^-1 J M^-1) tau: the part of `tau` (7,) that does not accelerate the rows of J.
+    It is the part of `tau` that does not accelerate the rows of J.
 
     Args:
-        J: Jacobian (m, 7).
-        JMinv: J M^-1 (m, 7).
-        tau: Joint torque (7,) [N m].
+        J: Jacobian (m, n).
+        JMinv: J M^-1 (m, n).
+        tau: Joint torque (n,) [N m], changed in place.
     """
-    return tau - np.linalg.solve(JMinv @ J.T, JMinv @ tau) @ J
+    m = J.shape[0]
+    A, force = np.empty((m, m)), np.empty(m)
+    outer_product(JMinv, J, A)
+    if not factor(A):
+        return False
+    times(JMinv, tau, force)
+    back_substitute(A, force)
+    for i in range(m):
+        for j in range(tau.size):
+            tau[j] -= J[i, j] * force[i]
+    return True

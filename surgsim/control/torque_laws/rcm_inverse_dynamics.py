@@ -1,6 +1,5 @@
 """RCM inverse dynamics: ours. RCM over tip over posture at acceleration level, disturbances rejected."""
 
-from dataclasses import dataclass
 from typing import Annotated, Literal
 
 import numpy as np
@@ -9,16 +8,40 @@ from pydantic import Field, NonNegativeFloat, NonNegativeInt, PositiveFloat
 
 from surgsim.catalog import PartConfig
 from surgsim.compiled import compiled
-from surgsim.control.acceleration import AccelerationLimits, PriorityProgram
-from surgsim.control.manipulability import velocity_product_accelerations
-from surgsim.control.observer import DelayEstimate, DisturbanceObserver, ObserverState
-from surgsim.control.rcm import rcm_bias_acceleration, rcm_kinematics
-from surgsim.control.torque_laws.base import TorqueProblem
-from surgsim.models.arm import ArmModel, Dynamics, Kinematics
+from surgsim.control.acceleration import TORQUE_SHARE, allows, fill_acceleration_bounds, prioritised
+from surgsim.control.manipulability import fill_velocity_products
+from surgsim.control.observer import (
+    delay_size,
+    estimate_delay,
+    observe,
+    observer_size,
+    remember_command,
+    torque_offset,
+)
+from surgsim.control.rcm import fill_rcm, fill_rcm_bias
+from surgsim.control.torque_laws.base import KernelTorqueLaw
+from surgsim.models.arm import ArmModel
+from surgsim.tick.algebra import (
+    back_substitute,
+    back_substitute_rows,
+    dot,
+    factor,
+    outer_product,
+    times,
+    transposed_times,
+)
+from surgsim.tick.arrays import Model, Seen
+from surgsim.tick.nominal import copy_model, dynamics, kinematics
+from surgsim.tick.status import GOES_ON, INFEASIBLE, RANK_LOST
 
 Array = NDArray[np.float64]
-_ORDERS = np.array([2.0, 1.0, 2.0, 1.0, 2.0, 1.0])
-"""How stiffness and damping gains go with the bandwidth."""
+
+K_RCM, D_RCM, K_TIP, D_TIP, K_JOINT, D_JOINT, OBSERVER, MOST_DELAY, FULL_GAIN, SENSOR_DELAY, YIELDS = range(
+    11
+)
+"""Places of the gains. The first six go with the bandwidth squared, or with the bandwidth, in turn."""
+TIP, RCM, JOINT, BIAS, DISTURBANCE, LIMITS = range(6)
+"""Rows of the terms."""
 
 
 class RcmInverseDynamicsConfig(PartConfig):
@@ -57,21 +80,37 @@ class RcmInverseDynamicsConfig(PartConfig):
     sensor_delay_s: NonNegativeFloat = 0.0
     contact: Literal["reject", "yield"] = "reject"
 
-    def build(self, arm: ArmModel) -> "RcmInverseDynamics":
-        """The law."""
-        return RcmInverseDynamics(self, arm)
+    def build(self, arm: ArmModel) -> KernelTorqueLaw:
+        """The law; memory of the disturbance observer, then of the delay estimate."""
+        n = arm.limits.torque.size
+        return KernelTorqueLaw(
+            kernel=rcm_inverse_dynamics,
+            arm=arm,
+            terms=("tip", "rcm", "joint", "bias", "observer", "limits"),
+            gains=np.array(
+                [
+                    self.rcm_stiffness_per_s2,
+                    2.0 * self.rcm_damping_ratio * self.rcm_stiffness_per_s2**0.5,
+                    self.tip_stiffness_per_s2,
+                    2.0 * self.tip_damping_ratio * self.tip_stiffness_per_s2**0.5,
+                    self.joint_stiffness_per_s2,
+                    2.0 * self.joint_damping_ratio * self.joint_stiffness_per_s2**0.5,
+                    self.observer_gain,
+                    self.most_delay_ticks,
+                    self.full_gain_delay_s,
+                    self.sensor_delay_s,
+                    self.contact == "yield",
+                ],
+                dtype=np.float64,
+            ),
+            memory_size=observer_size(n) + delay_size(n, self.most_delay_ticks),
+            failures={INFEASIBLE: "no joint acceleration keeps all limits"},
+        )
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class InverseDynamicsMemory:
-    """State of the law: what the observer and the delay estimate carry."""
-
-    observer: ObserverState
-    delay: DelayEstimate
-
-
-class RcmInverseDynamics:
-    """tau = M q'' + bias + D q' - d, at the state predicted for when the torque will act.
+@compiled
+def rcm_inverse_dynamics(gains: Array, seen: Seen, memory: Array, out: Array) -> int:
+    """Tau = M q'' + bias + D q' - d, at the state predicted for when the torque will act.
 
     The accelerations ask for second-order error dynamics,
 
@@ -82,155 +121,202 @@ class RcmInverseDynamics:
     solved in closed form with the inertia-weighted inverse: where [J_T; J_rcm] has full rank, no row has to
     give way. If that answer would pass a torque limit, or a velocity from which a joint cannot stop before
     its limit, a cascade of quadratic programs keeps the limits and lets the posture give way first, then the
-    tip, and the RCM last (`PriorityProgram`).
+    tip, and the RCM last (`surgsim.control.acceleration.prioritised`).
 
-    d is the disturbance torque that `DisturbanceObserver` infers from measured torque and motion: payload,
-    friction, wrong inertia, pushes. It is fed by the measured torque, so that saturation and late torques do
-    not wind it up, less the slow mean by which measured and commanded torque differ: a biased drive or
-    sensor. With `contact: yield` the measured force f on the tip is not left to the observer. It is cancelled
-    at once, and the tip is asked for the acceleration along f that it would take under it with the shaft held
-    in the trocar,
+    d is the disturbance torque that `surgsim.control.observer.observe` infers from measured torque and
+    motion: payload, friction, wrong inertia, pushes. It is fed by the measured torque, so that saturation and
+    late torques do not wind it up, less the slow mean by which measured and commanded torque differ: a biased
+    drive or sensor. With `contact: yield` the measured force f on the tip is not left to the observer. It is
+    cancelled at once, and the tip is asked for the acceleration along f that it would take under it with the
+    shaft held in the trocar,
 
         a_T += f (f' P f) / (f' f),    P the tip's mobility with the RCM held (3, 3) [1/kg],
 
     so that RCM, posture and the tip across f do not give way.
 
-    An actuation delay shows as the lag of measured behind commanded torque (`DelayEstimate`); the law then
+    An actuation delay shows as the lag of measured behind commanded torque (`estimate_delay`); the law then
     acts on the state predicted with the torques still on their way, which is why stiff gains survive it. Past
     `full_gain_delay_s` the prediction is no longer good enough: bandwidths and observer gain fall as its
     inverse.
 
+    Rows tip, rcm, joint, bias, observer, limits (6, n) [N m].
+
     Source: ours; the hierarchy is operational-space control (Khatib 1987), the observer the discrete form of
     a momentum observer (De Luca et al. 2006), the prediction one of the state over the dead time.
     """
-
-    terms = ("tip", "rcm", "joint", "bias", "observer", "limits")
-
-    def __init__(self, config: RcmInverseDynamicsConfig, arm: ArmModel) -> None:
-        self._c = config
-        self._arm = arm
-        self._damping = arm.damping
-        self._limits = AccelerationLimits(arm.limits)
-        self._priority = PriorityProgram()
-        self._observer = DisturbanceObserver(config.observer_gain, arm.damping)
-        c = config
-        self._gains = np.array(
-            [
-                c.rcm_stiffness_per_s2,
-                2.0 * c.rcm_damping_ratio * c.rcm_stiffness_per_s2**0.5,
-                c.tip_stiffness_per_s2,
-                2.0 * c.tip_damping_ratio * c.tip_stiffness_per_s2**0.5,
-                c.joint_stiffness_per_s2,
-                2.0 * c.joint_damping_ratio * c.joint_stiffness_per_s2**0.5,
-            ]
-        )
-
-    def start(self, problem: TorqueProblem) -> InverseDynamicsMemory:
-        """No disturbance known, no delay; the limits' programs forget their active sets."""
-        self._priority = PriorityProgram()
-        return InverseDynamicsMemory(
-            observer=self._observer.start(), delay=DelayEstimate.start(self._c.most_delay_ticks)
-        )
-
-    def torque(
-        self, problem: TorqueProblem, memory: InverseDynamicsMemory
-    ) -> tuple[Array, InverseDynamicsMemory]:
-        """Rows tip, rcm, joint, bias, observer, limits (6, 7) [N m]."""
-        p = problem
-        delay = memory.delay.update(p.tau_measured, p.dt_s)
-        late_s = delay.ticks * p.dt_s
-        share = min(1.0, self._c.full_gain_delay_s / late_s) if delay.ticks else 1.0
-        touch = p.f_T @ p.kin.Jv_WT if self._c.contact == "yield" else np.zeros(7)
-        observer = self._observer.update(memory.observer, p, share, delay.offset - touch)
-        d = observer.disturbance + touch
-        q, v, kin, dyn = p.q, p.v, p.kin, p.dyn
-        if delay.ticks:
-            q, v = predict(p, delay.in_flight, d, self._damping)
-            kin, dyn = self._arm.evaluate(q, v)
-        terms = self._terms(p, q, v, kin, dyn, late_s, d, share)
-        limit = self._arm.limits.torque
-        sent = np.minimum(np.maximum(terms.sum(axis=0), -limit), limit)
-        return terms, InverseDynamicsMemory(observer=observer, delay=delay.sent(sent))
-
-    def _terms(
-        self,
-        p: TorqueProblem,
-        q: Array,
-        v: Array,
-        kin: Kinematics,
-        dyn: Dynamics,
-        late_s: float,
-        d: Array,
-        share: float,
-    ) -> Array:
-        """Terms of the torque for the state (q, v) that is reached `late_s` from now."""
-        k, command = self._gains * share**_ORDERS, p.command
-        linear, angular = velocity_product_accelerations(kin, v)
-        ahead_s = max(late_s - self._c.sensor_delay_s, 0.0)
-        p_d = command.p_WTd + ahead_s * (command.v_WTd + 0.5 * ahead_s * command.a_WTd)
-        v_d = command.v_WTd + ahead_s * command.a_WTd
-        a_tip = command.a_WTd - linear + k[3] * (v_d - kin.Jv_WT @ v) + k[2] * (p_d - kin.p_WT)
-        J, a = kin.Jv_WT, a_tip
-        if p.rcm is not None:
-            p_WC = p.p_WC + late_s * (p.v_WC + 0.5 * late_s * p.a_WC)
-            v_WC = p.v_WC + late_s * p.a_WC
-            rcm = rcm_kinematics(kin, p_WC, v_WC)
-            bias = rcm_bias_acceleration(kin, v, p_WC, v_WC, linear, angular) - rcm.normals @ p.a_WC
-            e_dot = rcm.jacobian @ v - rcm.trocar_velocity
-            J = np.concatenate((J, rcm.jacobian))
-            a = np.concatenate((a, -bias - k[0] * rcm.error - k[1] * e_dot))
-        if self._c.contact == "yield" and p.f_T.any():
-            a[:3] += _giving_way(dyn.mass_matrix, J, p.f_T)
-        qdot_ref = p.resolution.qdot
-        posture = k[4] * (p.q_ref + ahead_s * qdot_ref - q) + k[5] * (qdot_ref - v)
-        constant = dyn.bias + self._damping * v - d
-        terms, qddot = _inverse_dynamics(dyn.mass_matrix, J, a, posture)
-        terms[3] = dyn.bias + self._damping * v
-        terms[4] = -d
-        low, high = self._limits.bounds(q, v, p.dt_s)
-        if not self._limits.allows(dyn.mass_matrix @ qddot + constant, qddot, low, high):
-            kept = self._priority.solve(dyn.mass_matrix, constant, J, a, posture, low, high, self._limits)
-            terms[5] = dyn.mass_matrix @ (kept - qddot)
-        return terms
+    n, dt, first, most = seen.q.size, seen.dt_s, seen.first != 0, int(gains[MOST_DELAY])
+    known, delayed = memory[: n * (n + 3)], memory[n * (n + 3) :]
+    ticks = estimate_delay(delayed, first, seen.tau, most, dt)
+    late = ticks * dt
+    share = min(1.0, gains[FULL_GAIN] / late) if ticks > 0 else 1.0
+    touch, tau, d = np.zeros(n), np.empty(n), np.empty(n)
+    if gains[YIELDS] != 0.0:
+        transposed_times(seen.Jv_WT, seen.f_T, touch)
+    offset = torque_offset(delayed, most, n)
+    for i in range(n):
+        tau[i] = seen.tau[i] - (offset[i] - touch[i])
+    learnt = observe(known, first, seen.M, seen.bias, seen.damping, seen.v, tau, share * gains[OBSERVER], dt)
+    for i in range(n):
+        d[i] = learnt[i] + touch[i]
+    model = seen.elsewhere
+    if ticks > 0:
+        q, v = seen.q.copy(), seen.v.copy()
+        if not predict(q, v, seen.M, seen.bias, d, seen.damping, delayed, ticks, dt):
+            return RANK_LOST
+        kinematics(model, q)
+        dynamics(model, v)
+    else:
+        copy_model(seen, model)
+    status = _terms(gains, seen, model, late, d, share, out)
+    if status != GOES_ON:
+        return status
+    for i in range(n):
+        s = 0.0
+        for k in range(out.shape[0]):
+            s += out[k, i]
+        tau[i] = min(max(s, -seen.tau_max[i]), seen.tau_max[i])
+    remember_command(delayed, most, tau)
+    return GOES_ON
 
 
-def predict(p: TorqueProblem, in_flight: Array, d: Array, damping: Array) -> tuple[Array, Array]:
-    """Joint state after the torques `in_flight` (n, 7) [N m] have acted, one a period.
+@compiled
+def predict(
+    q: Array,
+    v: Array,
+    M: Array,
+    bias: Array,
+    d: Array,
+    damping: Array,
+    commands: Array,
+    ticks: int,
+    dt: float,
+) -> bool:
+    """Move (q, v), each (n,), by the last `ticks` torques in `commands`, newest first; False without inertia.
 
     Semi-implicit Euler with the inertia and bias of the present state, which change little over a few
     milliseconds.
-
-    Returns:
-        Positions (7,) [rad] and velocities (7,) [rad/s].
     """
-    return _predict(p.q, p.v, p.dyn.mass_matrix, p.dyn.bias - d, damping, in_flight, p.dt_s)
+    n = q.size
+    L, rate = M.copy(), np.empty(n)
+    for i in range(n):
+        L[i, i] += dt * damping[i]
+    if not factor(L):
+        return False
+    for k in range(ticks - 1, -1, -1):
+        for i in range(n):
+            rate[i] = commands[k * n + i] - (bias[i] - d[i]) - damping[i] * v[i]
+        back_substitute(L, rate)
+        for i in range(n):
+            v[i] += dt * rate[i]
+            q[i] += dt * v[i]
+    return True
 
 
 @compiled
-def _predict(
-    q: Array, v: Array, M: Array, bias: Array, damping: Array, in_flight: Array, dt: float
-) -> tuple[Array, Array]:
-    implicit = M + dt * np.diag(damping)
-    for i in range(in_flight.shape[0]):
-        v = v + dt * np.linalg.solve(implicit, in_flight[i] - bias - damping * v)
-        q = q + dt * v
-    return q, v
+def _task_accelerations(
+    gains: Array, seen: Seen, model: Model, late: float, share: float, J: Array, a: Array
+) -> None:
+    """Fill rows J (m, n) and accelerations a (m,) of tip and RCM at the state of `model`, `late` [s] from now."""
+    linear, angular, rate = np.empty(3), np.empty(3), np.empty(3)
+    fill_velocity_products(model.Jv_WT, model.z_W, model.v, linear, angular)
+    ahead = max(late - gains[SENSOR_DELAY], 0.0)
+    times(model.Jv_WT, model.v, rate)
+    square = share * share
+    for i in range(3):
+        J[i] = model.Jv_WT[i]
+        p_d = seen.p_WTd[i] + ahead * (seen.v_WTd[i] + 0.5 * ahead * seen.a_WTd[i])
+        v_d = seen.v_WTd[i] + ahead * seen.a_WTd[i]
+        pull = square * gains[K_TIP] * (p_d - model.p_WT[i]) + share * gains[D_TIP] * (v_d - rate[i])
+        a[i] = seen.a_WTd[i] - linear[i] + pull
+    if a.size == 3:
+        return
+    p_WC, v_WC = np.empty(3), np.empty(3)
+    for i in range(3):
+        p_WC[i] = seen.p_WC[i] + late * (seen.v_WC[i] + 0.5 * late * seen.a_WC[i])
+        v_WC[i] = seen.v_WC[i] + late * seen.a_WC[i]
+    error, moving, bias = np.empty(2), np.empty(2), np.empty(2)
+    normals = np.empty((2, 3))
+    fill_rcm(model.p_WT, model.R_WT, model.Jv_WT, model.Jw_WT, p_WC, v_WC, error, J[3:], moving, normals)
+    fill_rcm_bias(
+        model.p_WT, model.R_WT, model.Jv_WT, model.Jw_WT, model.v, p_WC, v_WC, linear, angular, bias
+    )
+    for i in range(2):
+        e_dot = dot(J[3 + i], model.v) - moving[i]
+        pull = square * gains[K_RCM] * error[i] + share * gains[D_RCM] * e_dot
+        a[3 + i] = dot(normals[i], seen.a_WC) - bias[i] - pull
 
 
 @compiled
-def _giving_way(M: Array, J: Array, f: Array) -> Array:
-    """Acceleration of the tip (3,) along the force `f` on it, the further rows of `J` held."""
-    held = np.ascontiguousarray(np.linalg.inv(J @ np.linalg.solve(M, J.T))[:3, :3])
-    return f * (f @ np.linalg.solve(held, f)) / (f @ f)
+def _give_way(M: Array, J: Array, f: Array, a: Array) -> bool:
+    """Add to `a` the acceleration of the tip along the force `f` on it, the further rows of J held."""
+    m, size = J.shape[0], dot(f, f)
+    if size == 0.0:
+        return True
+    L, Y, A, inverse = M.copy(), J.copy(), np.empty((m, m)), np.eye(m)
+    if not factor(L):
+        return False
+    back_substitute_rows(L, Y)
+    outer_product(J, Y, A)
+    if not factor(A):
+        return False
+    back_substitute_rows(A, inverse)
+    held, moved = inverse[:3, :3].copy(), f.copy()
+    if not factor(held):
+        return False
+    back_substitute(held, moved)
+    share = dot(f, moved) / size
+    for i in range(3):
+        a[i] += f[i] * share
+    return True
 
 
 @compiled
-def _inverse_dynamics(M: Array, J: Array, a: Array, posture: Array) -> tuple[Array, Array]:
-    """Terms (6, 7) of M q'' [N m], the last three zero, and q'' (7,) with J q'' = a nearest to `posture`."""
-    MinvJT = np.linalg.solve(M, J.T)
-    force = np.linalg.solve(J @ MinvJT, a - J @ posture)
-    terms = np.zeros((6, 7))
-    terms[0] = force[:3] @ J[:3]
-    terms[1] = force[3:] @ J[3:]
-    terms[2] = M @ posture
-    return terms, posture + MinvJT @ force
+def _terms(gains: Array, seen: Seen, model: Model, late: float, d: Array, share: float, out: Array) -> int:
+    """Fill the terms of the torque for the state of `model`, which is reached `late` [s] from now."""
+    n, m, M = seen.q.size, 3 + seen.rows, model.M
+    J, a, posture = np.empty((m, n)), np.empty(m), np.empty(n)
+    _task_accelerations(gains, seen, model, late, share, J, a)
+    if gains[YIELDS] != 0.0 and not _give_way(M, J, seen.f_T, a):
+        return RANK_LOST
+    ahead = max(late - gains[SENSOR_DELAY], 0.0)
+    for i in range(n):
+        gap = seen.q_ref[i] + ahead * seen.qdot_ref[i] - model.q[i]
+        turning = share * gains[D_JOINT] * (seen.qdot_ref[i] - model.v[i])
+        posture[i] = share * share * gains[K_JOINT] * gap + turning
+    L, Y, A, force = M.copy(), J.copy(), np.empty((m, m)), np.empty(m)
+    if not factor(L):
+        return RANK_LOST
+    back_substitute_rows(L, Y)
+    outer_product(J, Y, A)
+    if not factor(A):
+        return RANK_LOST
+    times(J, posture, force)
+    for i in range(m):
+        force[i] = a[i] - force[i]
+    back_substitute(A, force)
+    transposed_times(J[:3], force[:3], out[TIP])
+    transposed_times(J[3:], force[3:], out[RCM])
+    times(M, posture, out[JOINT])
+    qddot, constant, torque, most = np.empty(n), np.empty(n), np.empty(n), np.empty(n)
+    transposed_times(Y, force, qddot)
+    for i in range(n):
+        qddot[i] += posture[i]
+        out[BIAS, i] = model.bias[i] + seen.damping[i] * model.v[i]
+        out[DISTURBANCE, i] = -d[i]
+        out[LIMITS, i] = 0.0
+        constant[i] = out[BIAS, i] - d[i]
+        most[i] = TORQUE_SHARE * seen.tau_max[i]
+    times(M, qddot, torque)
+    for i in range(n):
+        torque[i] += constant[i]
+    low, high = np.empty(n), np.empty(n)
+    fill_acceleration_bounds(seen, model.q, model.v, low, high)
+    if allows(torque, most, qddot, low, high):
+        return GOES_ON
+    kept = np.empty(n)
+    status = prioritised(M, constant, J, a, posture, low, high, most, kept)
+    if status == GOES_ON:
+        for i in range(n):
+            kept[i] -= qddot[i]
+        times(M, kept, out[LIMITS])
+    return status

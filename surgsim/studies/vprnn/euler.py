@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from surgsim.control.problem import ControlFailure
+from surgsim.control.failure import ControlFailure
 from surgsim.control.resolvers.vprnn import Vprnn
 from surgsim.studies.study import Row
 from surgsim.studies.vprnn.cases import METHODS, NOMINAL, errors, outcome, run_case

@@ -12,7 +12,7 @@ from surgsim.control.policies.asking import Asker
 from surgsim.control.policies.observation import observe
 from surgsim.control.policies.registry import find_policy, offering, policy_names, register_policy
 from surgsim.control.policies.shipped import damping, proportional
-from surgsim.control.problem import ControlFailure
+from surgsim.control.failure import ControlFailure
 from surgsim.control.resolvers.pinv import Pinv, PinvConfig
 from surgsim.control.resolvers.policy import PolicyConfig
 from surgsim.control.torque_laws.policy import PolicyLawConfig

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from surgsim.control.problem import ControlFailure
+from surgsim.control.failure import ControlFailure
 from surgsim.control.resolvers.mink import Mink, MinkConfig
 from surgsim.control.resolvers.pinv import Pinv, PinvConfig
 from surgsim.errors import Outcome

@@ -10,7 +10,7 @@ from pydantic import ValidationError
 from scipy.optimize import lsq_linear
 
 from surgsim.control.planes import PlaneConfig
-from surgsim.control.problem import ControlFailure
+from surgsim.control.failure import ControlFailure
 from surgsim.control.resolvers.qp import Qp, QpConfig
 from surgsim.control.resolvers.vprnn import Vprnn, VprnnConfig
 from surgsim.errors import Outcome

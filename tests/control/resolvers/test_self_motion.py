@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from surgsim.control.problem import ControlFailure
+from surgsim.control.failure import ControlFailure
 from surgsim.control.resolvers.self_motion import SelfMotionConfig
 from surgsim.control.self_motion import SelfMotion
 from surgsim.errors import Outcome

@@ -11,7 +11,7 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import null_space
 
 from surgsim.control.manipulability import jacobian_gradient
-from surgsim.control.problem import ControlFailure
+from surgsim.control.failure import ControlFailure
 from surgsim.control.rcm import rcm_cross_form
 from surgsim.control.resolvers.vprnn import Vprnn, VprnnConfig, VprnnMemory
 

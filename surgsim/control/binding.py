@@ -1,0 +1,218 @@
+"""Joins a controller's parts, kernels or Python objects, to the arrays of its tick."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numba.core.dispatcher import Dispatcher
+from numpy.typing import NDArray
+
+from surgsim.columns import Block
+from surgsim.compiled import as_parameter
+from surgsim.control.decision import ESTIMATOR, LAW, SOLVER, Minds
+from surgsim.control.failure import ControlFailure, failure_of
+from surgsim.control.port_estimators.base import PortEstimate, port_problem_of
+from surgsim.control.problem import Resolution
+from surgsim.control.seen import fill_constants, velocity_problem_of
+from surgsim.control.torque_laws.base import torque_problem_of
+from surgsim.errors import Outcome
+from surgsim.models.arm import ArmModel
+from surgsim.tick.arrays import Control, law_signature, new, resolver_signature
+from surgsim.tick.python_part import PythonPart, python_kernel
+from surgsim.tick.status import TOLD
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True)
+class ControllerParts:
+    """A controller's parts as their configs build them: kernels with their numbers, or Python objects.
+
+    Attributes:
+        port: Port estimator.
+        resolver: Resolver.
+        law: Torque law; None on the kinematic plant.
+    """
+
+    port: Any
+    resolver: Any
+    law: Any
+
+    @property
+    def terms(self) -> tuple[str, ...]:
+        """Names of the torque law's terms."""
+        return () if self.law is None else tuple(self.law.terms)
+
+    @property
+    def columns(self) -> tuple[Block, ...]:
+        """The resolver's columns."""
+        return tuple(getattr(self.resolver, "columns", ()))
+
+    def minds(self, n: int) -> Minds:
+        """Numbers and memories of the parts, for n joints."""
+        return Minds(
+            port_gains=_gains(self.port),
+            port_memory=_memory(self.port),
+            resolver_gains=_gains(self.resolver),
+            resolver_memory=_memory(self.resolver),
+            law_gains=_gains(self.law),
+            law_memory=_memory(self.law),
+            terms=np.zeros((len(self.terms), n)),
+            port=np.zeros((3, 3)),
+        )
+
+
+def new_control(
+    arm: ArmModel, *, dt_s: float, has_trocar: bool, has_law: bool, omega_gain: float, at_reference: bool
+) -> Any:
+    """The record of a controller's tick; `arm` must outlive it."""
+    c = new(Control, arm.limits.q_min.size)
+    c.has_law, c.at_reference, c.command.budget_j = has_law, at_reference, np.inf
+    for seen in (c.seen, c.referred):
+        fill_constants(seen, arm, dt_s=dt_s, has_trocar=has_trocar, omega_gain=omega_gain)
+    arm.point(c.measured)
+    arm.point(c.reference)
+    return c
+
+
+def _gains(part: Any) -> Array:
+    """The part's numbers; one place for the address of a part that is entered in Python."""
+    return part.gains.copy() if _is_compiled(part) else np.zeros(1)
+
+
+def _memory(part: Any) -> Array:
+    return np.zeros(getattr(part, "memory_size", 0))
+
+
+def _is_compiled(part: Any) -> bool:
+    return isinstance(getattr(part, "kernel", None), Dispatcher)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Bound:
+    """Parts joined to the records of a tick.
+
+    Attributes:
+        kernels: Port estimator, resolver and torque law.
+        entered: The parts that are entered in Python, by the value of `Control.who`.
+        parts: The parts.
+        control: The record of the tick.
+        minds: Their numbers and memories.
+    """
+
+    kernels: tuple[Any, Any, Any]
+    entered: dict[int, PythonPart]
+    parts: ControllerParts
+    control: Any
+    minds: Minds
+
+    def failure(self, status: int) -> ControlFailure:
+        """Why the last tick has no answer.
+
+        Raises:
+            BaseException: What a Python part raised, if that is no failure of a controller.
+        """
+        who, c = int(self.control.who), self.control
+        if status == TOLD:
+            error = self.entered[who].raised()
+            if isinstance(error, ControlFailure):
+                return error
+            if isinstance(error, np.linalg.LinAlgError):
+                text = f"the task Jacobian has lost rank ({error})"
+                return ControlFailure(Outcome.INFEASIBLE, text, {"q": c.seen.q.copy()})
+            assert error is not None, "a Python part stopped the tick without an error"
+            raise error
+        seen = c.referred if who == SOLVER and c.at_reference else c.seen
+        if who == SOLVER and hasattr(self.parts.resolver, "failure"):
+            failure: ControlFailure = self.parts.resolver.failure(status, seen, self.minds.resolver_memory)
+            return failure
+        if who == LAW and hasattr(self.parts.law, "failure"):
+            failure = self.parts.law.failure(status, seen)
+            return failure
+        return failure_of(status, {}, {"q": seen.q.copy()})
+
+
+def bind(parts: ControllerParts, control: Any, arm: ArmModel) -> Bound:
+    """Join the parts to the record of a tick; those that are no compiled kernel are entered in Python."""
+    entered: dict[int, PythonPart] = {}
+    n = arm.limits.q_min.size
+    minds = parts.minds(n)
+
+    def kernel(who: int, part: Any, gains: Array, call: Callable[[], int | None]) -> Any:
+        signature = resolver_signature(n) if who == SOLVER else law_signature(n)
+        if _is_compiled(part):
+            return as_parameter(part.kernel, signature)
+        if part is not None:
+            entered[who] = PythonPart(call)
+            gains[:] = entered[who].gains
+        return as_parameter(python_kernel, signature)
+
+    return Bound(
+        kernels=(
+            kernel(ESTIMATOR, parts.port, minds.port_gains, _port_call(parts.port, control, minds)),
+            kernel(SOLVER, parts.resolver, minds.resolver_gains, _resolver_call(parts, control, minds, arm)),
+            kernel(LAW, parts.law, minds.law_gains, _law_call(parts.law, control, minds)),
+        ),
+        entered=entered,
+        parts=parts,
+        control=control,
+        minds=minds,
+    )
+
+
+def _port_call(port: Any, c: Any, minds: Minds) -> Callable[[], int | None]:
+    if hasattr(port, "kernel"):
+        return lambda: port.kernel(port.gains, c.seen, minds.port_memory, minds.port)
+    memory: Any = None
+
+    def call() -> None:
+        nonlocal memory
+        problem = port_problem_of(c.seen, has_dynamics=bool(c.has_law))
+        if c.seen.first:
+            memory = port.start(problem)
+        estimate: PortEstimate
+        estimate, memory = port.step(problem, memory)
+        minds.port[0], minds.port[1], minds.port[2] = estimate.p_WC, estimate.v_WC, estimate.a_WC
+
+    return call
+
+
+def _resolver_call(parts: ControllerParts, c: Any, minds: Minds, arm: ArmModel) -> Callable[[], int | None]:
+    resolver, seen = parts.resolver, c.referred if c.at_reference else c.seen
+    if hasattr(resolver, "kernel"):
+        return lambda: resolver.kernel(resolver.gains, seen, minds.resolver_memory, c.resolved)
+    memory: Any = None
+
+    def call() -> None:
+        nonlocal memory
+        problem = velocity_problem_of(seen, arm.limits)
+        if seen.first:
+            memory = resolver.start(problem)
+        found: Resolution
+        found, memory = resolver.step(problem, memory)
+        out = c.resolved
+        out.qdot[:], out.residual = found.qdot, found.residual
+        out.values[: found.values.size] = found.values
+        if found.command is not None:
+            told = found.command
+            out.p_WTd[:], out.v_WTd[:], out.a_WTd[:] = told.p_WTd, told.v_WTd, told.a_WTd
+
+    return call
+
+
+def _law_call(law: Any, c: Any, minds: Minds) -> Callable[[], int | None]:
+    if hasattr(law, "kernel"):
+        return lambda: law.kernel(law.gains, c.seen, minds.law_memory, minds.terms)
+    memory: Any = None
+
+    def call() -> None:
+        nonlocal memory
+        out = c.resolved
+        resolution = Resolution(qdot=out.qdot.copy(), residual=float(out.residual), values=out.values.copy())
+        problem = torque_problem_of(c.seen, resolution)
+        if c.seen.first:
+            memory = law.start(problem)
+        minds.terms[:], memory = law.torque(problem, memory)
+
+    return call

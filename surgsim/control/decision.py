@@ -1,0 +1,177 @@
+"""A controller's tick as a kernel: nominal model, port estimate, resolver, torque law, joint reference."""
+
+from functools import cache
+from typing import Any, NamedTuple
+
+from numba import types
+
+from surgsim.compiled import compiled
+from surgsim.control.bounds import fill_velocity_bounds
+from surgsim.control.rcm import fill_rcm
+from surgsim.tick.arrays import A1, A2, Array, Control, Seen, law_signature, resolver_signature, type_of
+from surgsim.tick.nominal import copy_model, dynamics, kinematics
+from surgsim.tick.status import GOES_ON
+
+ESTIMATOR, SOLVER, LAW = range(3)
+"""Values of `Control.who`."""
+
+
+class Minds(NamedTuple):
+    """Numbers and memories of a controller's parts, and the terms of its torque.
+
+    Attributes:
+        port_gains: Of the port estimator.
+        port_memory: Of the port estimator.
+        resolver_gains: Of the resolver.
+        resolver_memory: Of the resolver.
+        law_gains: Of the torque law.
+        law_memory: Of the torque law.
+        terms: Terms of the torque (k, n) [N m].
+        port: Where the port estimator's answer goes (3, 3).
+    """
+
+    port_gains: Array
+    port_memory: Array
+    resolver_gains: Array
+    resolver_memory: Array
+    law_gains: Array
+    law_memory: Array
+    terms: Array
+    port: Array
+
+
+MINDS = types.NamedTuple([A1, A1, A1, A1, A1, A1, A2, A2], Minds)
+
+
+@cache
+def part_types(n: int) -> tuple[Any, Any, Any]:
+    """Types of port estimator, resolver and torque law as parameters, for n joints."""
+    law, resolver = types.FunctionType(law_signature(n)), types.FunctionType(resolver_signature(n))
+    return law, resolver, law
+
+
+@cache
+def decide_signature(n: int) -> Any:
+    """Status = decide(control, minds, estimator, resolver, law)."""
+    return types.int64(type_of(Control, n), MINDS, *part_types(n))
+
+
+@compiled
+def decide(c: Control, minds: Minds, estimator: Any, resolver: Any, law: Any) -> int:
+    """Fill the answers in `c` from the measured state and the command in it."""
+    seen = c.seen
+    _refer(c, minds)
+    kinematics(c.measured, seen.q)
+    if c.has_law:
+        dynamics(c.measured, seen.v)
+    c.measured.v[:] = seen.v
+    copy_model(c.measured, seen)
+    c.who = ESTIMATOR
+    status = estimator(minds.port_gains, seen, minds.port_memory, minds.port)
+    if status != GOES_ON:
+        return status
+    _see_port(c, minds)
+    _see_command(c)
+    c.who = SOLVER
+    if c.at_reference:
+        status = resolver(minds.resolver_gains, _referred(c), minds.resolver_memory, c.resolved)
+    else:
+        _bound(seen)
+        status = resolver(minds.resolver_gains, seen, minds.resolver_memory, c.resolved)
+    if status != GOES_ON:
+        return status
+    c.torque[:] = 0.0
+    if c.has_law:
+        c.who = LAW
+        seen.qdot_ref[:] = c.resolved.qdot
+        seen.p_WTd[:] = c.resolved.p_WTd
+        seen.v_WTd[:] = c.resolved.v_WTd
+        seen.a_WTd[:] = c.resolved.a_WTd
+        status = law(minds.law_gains, seen, minds.law_memory, minds.terms)
+        if status != GOES_ON:
+            return status
+        for i in range(minds.terms.shape[0]):
+            for j in range(c.torque.size):
+                c.torque[j] += minds.terms[i, j]
+    seen.first = 0
+    return GOES_ON
+
+
+@compiled
+def _refer(c: Control, minds: Minds) -> None:
+    """The joint reference of this tick: moved by the resolver's last answer, inside the range."""
+    seen = c.seen
+    if seen.first:
+        seen.q_ref[:] = seen.q
+        seen.qdot_ref[:] = seen.v
+        minds.port_memory[:] = 0.0
+        minds.resolver_memory[:] = 0.0
+        minds.law_memory[:] = 0.0
+    else:
+        for i in range(seen.q.size):
+            moved = seen.q_ref[i] + seen.dt_s * c.resolved.qdot[i]
+            seen.q_ref[i] = min(max(moved, seen.q_min[i]), seen.q_max[i])
+            seen.qdot_ref[i] = c.resolved.qdot[i]
+    c.q_ref[:] = seen.q_ref
+
+
+@compiled
+def _see_port(c: Control, minds: Minds) -> None:
+    """Estimate and shift of the remote centre, and the RCM's kinematics."""
+    seen, port = c.seen, minds.port
+    for i in range(3):
+        for k in range(3):
+            c.port[i, k] = port[i, k]
+        seen.p_WC[i] = port[0, i] + c.command.rcm_shift[i]
+        seen.v_WC[i] = port[1, i] + c.command.rcm_shift_rate[i]
+        seen.a_WC[i] = port[2, i]
+    if seen.has_trocar:
+        _rcm(seen)
+
+
+@compiled
+def _see_command(c: Control) -> None:
+    """What the parts are told to do; the torque law follows it too, unless the resolver writes another."""
+    seen, command, out = c.seen, c.command, c.resolved
+    seen.roll_rate, seen.jaw, seen.budget_j = command.roll_rate, command.jaw, command.budget_j
+    for i in range(3):
+        seen.budget_f_T[i] = command.budget_f_T[i]
+        seen.p_WTd[i] = out.p_WTd[i] = command.p_WTd[i]
+        seen.v_WTd[i] = out.v_WTd[i] = command.v_WTd[i]
+        seen.a_WTd[i] = out.a_WTd[i] = command.a_WTd[i]
+
+
+@compiled
+def _referred(c: Control) -> Seen:
+    """What a resolver sees that is evaluated at the joint reference."""
+    seen, other = c.seen, c.referred
+    kinematics(c.reference, seen.q_ref)
+    c.reference.v[:] = seen.qdot_ref
+    copy_model(c.reference, other)
+    other.t_s, other.first, other.budget_j = seen.t_s, seen.first, seen.budget_j
+    other.roll_rate, other.jaw = seen.roll_rate, seen.jaw
+    other.tau[:] = seen.tau
+    other.q_ref[:] = seen.q_ref
+    other.qdot_ref[:] = seen.qdot_ref
+    for i in range(3):
+        other.f_T[i], other.budget_f_T[i] = seen.f_T[i], seen.budget_f_T[i]
+        other.p_WC[i], other.v_WC[i], other.a_WC[i] = seen.p_WC[i], seen.v_WC[i], seen.a_WC[i]
+        other.p_WTd[i], other.v_WTd[i], other.a_WTd[i] = seen.p_WTd[i], seen.v_WTd[i], seen.a_WTd[i]
+    if other.has_trocar:
+        _rcm(other)
+    _bound(other)
+    return other
+
+
+@compiled
+def _bound(seen: Seen) -> None:
+    gain = seen.omega_gain
+    fill_velocity_bounds(seen.q, seen.q_min, seen.q_max, seen.v_max, gain, seen.lower, seen.upper)
+
+
+@compiled
+def _rcm(seen: Seen) -> None:
+    r = seen
+    r.depth = fill_rcm(
+        r.p_WT, r.R_WT, r.Jv_WT, r.Jw_WT, r.p_WC, r.v_WC, r.rcm_error, r.J_rcm, r.rcm_velocity, r.normals
+    )

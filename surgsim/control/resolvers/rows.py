@@ -1,0 +1,44 @@
+"""Rows that every resolver asks for, and what becomes of its answer."""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from surgsim.compiled import compiled
+from surgsim.tick.arrays import Resolved, Seen
+
+Array = NDArray[np.float64]
+
+
+@compiled
+def task_rows(seen: Seen, k_tip: float, k_rcm: float, rcm: bool) -> tuple[Array, Array]:
+    """Rows [J_T; J_rcm] (5, n) and right side [v_d; v_rcm] (5,), eq. (20) of the VPRNN paper.
+
+    v_d = -k1 (p - p_d) + p_d', v_rcm = -k2 e + N C'. Without a trocar, or with `rcm` False, the three tip
+    rows alone.
+    """
+    extra = seen.rows if rcm else 0
+    n = seen.q.size
+    J, v = np.empty((3 + extra, n)), np.empty(3 + extra)
+    for i in range(3):
+        J[i] = seen.Jv_WT[i]
+        v[i] = seen.v_WTd[i] - k_tip * (seen.p_WT[i] - seen.p_WTd[i])
+    for i in range(extra):
+        J[3 + i] = seen.J_rcm[i]
+        v[3 + i] = seen.rcm_velocity[i] - k_rcm * seen.rcm_error[i]
+    return J, v
+
+
+@compiled
+def answer(seen: Seen, qdot: Array, J: Array, v: Array, out: Resolved) -> None:
+    """`qdot` (n,) projected on Omega, with the residual that this leaves in J q' = v."""
+    total = 0.0
+    for j in range(qdot.size):
+        out.qdot[j] = min(max(qdot[j], seen.lower[j]), seen.upper[j])
+    for i in range(J.shape[0]):
+        row = -v[i]
+        for j in range(qdot.size):
+            row += J[i, j] * out.qdot[j]
+        total += row * row
+    out.residual = math.sqrt(total)

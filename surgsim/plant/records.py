@@ -1,0 +1,69 @@
+"""The record of a plant whose physics are MuJoCo's."""
+
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from surgsim.models.build import Scene
+from surgsim.tick.arrays import World, new
+
+_ARRAYS = (
+    "xaxis",
+    "xanchor",
+    "qpos",
+    "qvel",
+    "ctrl",
+    "qfrc_bias",
+    "qfrc_applied",
+    "xfrc_applied",
+    "xpos",
+    "xquat",
+    "xmat",
+    "xipos",
+    "site_xpos",
+    "site_xmat",
+    "cfrc_ext",
+    "mocap_pos",
+    "sensordata",
+)
+
+
+def world_of(
+    scene: Scene,
+    data: mujoco.MjData,
+    control_period_s: float,
+    *,
+    disturbed: bool = False,
+    touched: bool = False,
+) -> Any:
+    """The record of a plant in MuJoCo's `data`, which must outlive it."""
+    model, n = scene.model, len(scene.dof_ids)
+    world = new(World, n)
+    world.model, world.data = model._address, data._address
+    for name in _ARRAYS:
+        setattr(world, name, getattr(data, name).ctypes.data)
+    world.nq, world.nv, world.nbody = model.nq, model.nv, model.nbody
+    world.nsite, world.njnt = model.nsite, model.njnt
+    world.first_qpos, world.first_dof = _first(scene.qpos_ids), _first(scene.dof_ids)
+    world.first_ctrl, world.first_joint = _first(scene.actuator_ids), int(model.dof_jntid[scene.dof_ids[0]])
+    world.tip, world.entry = scene.tip_site, scene.shaft_entry_site
+    world.trocar = -1 if scene.trocar_site is None else scene.trocar_site
+    world.mocap = -1 if scene.port_mocap is None else scene.port_mocap
+    world.jaws = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, "jaws")
+    world.substeps = round(control_period_s / model.opt.timestep)
+    world.disturbed, world.touched, world.walled = disturbed, touched, scene.wall is not None
+    world.dt_s, world.timestep_s = control_period_s, model.opt.timestep
+    world.tau_max[:] = scene.limits.torque
+    world.p_WC[:] = world.p_WC_m[:] = world.f_C[:] = np.nan
+    if world.mocap >= 0:
+        world.port_home[:] = data.mocap_pos[world.mocap]
+    return world
+
+
+def _first(ids: Any) -> int:
+    """Where the arm's entries begin; they follow each other."""
+    first = int(ids[0])
+    if not np.array_equal(ids, np.arange(first, first + len(ids))):
+        raise ValueError(f"the arm's entries {ids} do not follow each other")
+    return first

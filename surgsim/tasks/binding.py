@@ -1,0 +1,63 @@
+"""Joins a task, a kernel or a Python object, to the arrays of a tick."""
+
+from typing import Any
+
+import numpy as np
+from numba.core.dispatcher import Dispatcher
+from numpy.typing import NDArray
+
+from surgsim.compiled import as_parameter
+from surgsim.tasks.base import Feedback, Task
+from surgsim.tasks.command import fill_command
+from surgsim.tick.arrays import task_signature
+from surgsim.tick.python_part import PythonPart, python_kernel
+
+Array = NDArray[np.float64]
+
+
+class BoundTask:
+    """A task as the loop sees it.
+
+    Args:
+        task: The task; one with a compiled `kernel` gives its numbers in `gains` and `memory`.
+        command: Where its command goes.
+
+    Attributes:
+        kernel: What the loop calls.
+        told: What the task is told; to be set by the loop.
+        gains: Its numbers.
+        memory: Its memory.
+    """
+
+    def __init__(self, task: Task, command: Any) -> None:
+        self._task, self._command = task, command
+        kernel: Any = getattr(task, "kernel", None)
+        self.told: Any = None
+        self._entered: PythonPart | None = None
+        self.memory: Array = getattr(task, "memory", np.zeros(0))
+        if isinstance(kernel, Dispatcher):
+            self.kernel = as_parameter(kernel, task_signature())
+            self.gains: Array = task.gains  # type: ignore[attr-defined]
+        else:
+            self._entered = PythonPart(self._call)
+            self.kernel, self.gains = as_parameter(python_kernel, task_signature()), self._entered.gains
+
+    def raised(self) -> BaseException | None:
+        """What a task in Python raised."""
+        return None if self._entered is None else self._entered.raised()
+
+    def _call(self) -> None:
+        told, t_s, out = self.told, float(self.told.t_s), self._command
+        feedback = None
+        if self._task.reacts:
+            feedback = Feedback(
+                p_WT=told.p_WT.copy(),
+                v_WT=told.v_WT.copy(),
+                R_WT=told.R_WT.copy(),
+                w_WT=told.w_WT.copy(),
+                f_T=told.f_T.copy(),
+            )
+        fill_command(out, self._task.command(t_s, feedback))
+        values = self._task.values()
+        out.values[: values.size] = values
+        out.finished = self._task.finished(t_s)

@@ -1,0 +1,163 @@
+"""Small dense linear algebra for kernels: nothing allocated but what is returned, nothing raised.
+
+Loops in a fixed order, so that the compiled and the Python form give the same bits, which BLAS does not promise.
+"""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from surgsim.compiled import compiled
+
+Array = NDArray[np.float64]
+DEPENDENT = 1e-14
+"""A pivot below this share of its diagonal entry counts as lost rank."""
+
+
+@compiled
+def dot(a: Array, b: Array) -> float:
+    """Inner product."""
+    s = 0.0
+    for i in range(a.size):
+        s += a[i] * b[i]
+    return s
+
+
+@compiled
+def norm(a: Array) -> float:
+    """Euclidean norm."""
+    return math.sqrt(dot(a, a))
+
+
+@compiled
+def cross(a: Array, b: Array, out: Array) -> None:
+    """Out = a x b, each (3,)."""
+    x = a[1] * b[2] - a[2] * b[1]
+    y = a[2] * b[0] - a[0] * b[2]
+    z = a[0] * b[1] - a[1] * b[0]
+    out[0], out[1], out[2] = x, y, z
+
+
+@compiled
+def times(A: Array, x: Array, out: Array) -> None:
+    """Out = A x, A (m, n)."""
+    for i in range(A.shape[0]):
+        s = 0.0
+        for j in range(A.shape[1]):
+            s += A[i, j] * x[j]
+        out[i] = s
+
+
+@compiled
+def transposed_times(A: Array, x: Array, out: Array) -> None:
+    """Out = A^T x, A (m, n)."""
+    for j in range(A.shape[1]):
+        out[j] = 0.0
+    for i in range(A.shape[0]):
+        for j in range(A.shape[1]):
+            out[j] += A[i, j] * x[i]
+
+
+@compiled
+def outer_product(A: Array, B: Array, out: Array) -> None:
+    """Out = A B^T, A (m, n) and B (k, n)."""
+    for i in range(A.shape[0]):
+        for j in range(B.shape[0]):
+            s = 0.0
+            for k in range(A.shape[1]):
+                s += A[i, k] * B[j, k]
+            out[i, j] = s
+
+
+@compiled
+def factor(A: Array) -> bool:
+    """A (n, n), symmetric, becomes its lower Cholesky factor; False where it is not positive definite."""
+    n = A.shape[0]
+    for i in range(n):
+        for j in range(i + 1):
+            s = A[i, j]
+            for k in range(j):
+                s -= A[i, k] * A[j, k]
+            if i != j:
+                A[i, j] = s / A[j, j]
+            elif not s > DEPENDENT * A[i, i]:
+                return False
+            else:
+                A[i, i] = math.sqrt(s)
+    return True
+
+
+@compiled
+def back_substitute(L: Array, x: Array) -> None:
+    """X (n,) becomes (L L^T)^-1 x, with L from `factor`."""
+    n = L.shape[0]
+    for i in range(n):
+        s = x[i]
+        for k in range(i):
+            s -= L[i, k] * x[k]
+        x[i] = s / L[i, i]
+    for i in range(n - 1, -1, -1):
+        s = x[i]
+        for k in range(i + 1, n):
+            s -= L[k, i] * x[k]
+        x[i] = s / L[i, i]
+
+
+@compiled
+def back_substitute_rows(L: Array, X: Array) -> None:
+    """Every row of X (m, n) becomes (L L^T)^-1 times it."""
+    for i in range(X.shape[0]):
+        back_substitute(L, X[i])
+
+
+@compiled
+def eliminate(A: Array, b: Array) -> bool:
+    """B (n,) becomes A^-1 b by Gauss with row pivots; A is spent. False where A is singular."""
+    n = A.shape[0]
+    for k in range(n):
+        p = k
+        for i in range(k + 1, n):
+            if abs(A[i, k]) > abs(A[p, k]):
+                p = i
+        if A[p, k] == 0.0:
+            return False
+        if p != k:
+            for j in range(k, n):
+                A[k, j], A[p, j] = A[p, j], A[k, j]
+            b[k], b[p] = b[p], b[k]
+        for i in range(k + 1, n):
+            c = A[i, k] / A[k, k]
+            if c != 0.0:
+                for j in range(k + 1, n):
+                    A[i, j] -= c * A[k, j]
+                b[i] -= c * b[k]
+    for i in range(n - 1, -1, -1):
+        s = b[i]
+        for j in range(i + 1, n):
+            s -= A[i, j] * b[j]
+        b[i] = s / A[i, i]
+    return True
+
+
+@compiled
+def nearest(J: Array, v: Array, wanted: Array, out: Array) -> bool:
+    """Out = the solution of J x = v nearest to `wanted` (n,): wanted + J^T (J J^T)^-1 (v - J wanted).
+
+    False where J (m, n) has lost rank. `out` may be `wanted`.
+    """
+    m = J.shape[0]
+    A, gap = np.empty((m, m)), np.empty(m)
+    outer_product(J, J, A)
+    if not factor(A):
+        return False
+    times(J, wanted, gap)
+    for i in range(m):
+        gap[i] = v[i] - gap[i]
+    back_substitute(A, gap)
+    for j in range(out.size):
+        s = wanted[j]
+        for i in range(m):
+            s += J[i, j] * gap[i]
+        out[j] = s
+    return True

@@ -1,0 +1,534 @@
+"""The records of a tick, and the signature of each kind of kernel that works on them.
+
+A part's law is a function: its gains, what it may see, its memory, and where its answer goes. It returns a status
+of `surgsim.tick.status`, allocates nothing that shows and raises nothing. What it sees and what it answers are
+records: plain C structs, one piece of memory each, read by name as `seen.q` or `seen.Jv_WT[i, j]` in Python and in
+compiled code alike. A record's layout follows from its class here and the number of joints n; compiled code
+gets a pointer to it. The same function runs as Python and compiled, with the same result bit for bit.
+
+Notation of the names: docs/notation.md. Frames W world, T tip, C trocar.
+"""
+
+from functools import cache
+from typing import Any, ClassVar, get_type_hints
+
+import numpy as np
+from numba import from_dtype, types
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Ids = NDArray[np.int64]
+
+A1 = types.float64[::1]
+A2 = types.float64[:, ::1]
+A3 = types.float64[:, :, ::1]
+I1 = types.int64[::1]
+I2 = types.int64[:, ::1]
+MOST_VALUES = 64
+"""Most columns that a task or a resolver can add to the trace."""
+
+
+class Record:
+    """Base of the records: fields in order, numbers as they are, arrays with their shape in `SHAPES`.
+
+    A shape is a text of whole numbers and `n`, the number of joints, e.g. `3 n`.
+    """
+
+    SHAPES: ClassVar[dict[str, str]] = {}
+
+
+@cache
+def layout(kind: type[Record], n: int) -> np.dtype[Any]:
+    """Memory layout of a record for `n` joints: C's, with its alignment."""
+    fields: list[tuple[Any, ...]] = []
+    for name, hint in get_type_hints(kind).items():
+        if name in kind.SHAPES:
+            shape = tuple(n if size == "n" else int(size) for size in kind.SHAPES[name].split())
+            fields.append((name, np.float64, shape))
+        elif isinstance(hint, type) and issubclass(hint, Record):
+            fields.append((name, layout(hint, n)))
+        elif hint in (float, int):
+            fields.append((name, np.float64 if hint is float else np.int64))
+    return np.dtype(fields, align=True)
+
+
+def new(kind: type[Record], n: int) -> Any:
+    """A record of zeros."""
+    return np.zeros(1, layout(kind, n)).view(np.recarray)[0]
+
+
+@cache
+def type_of(kind: type[Record], n: int) -> Any:
+    """Numba's type of a record."""
+    return from_dtype(layout(kind, n))
+
+
+class Model(Record):
+    """The controller's own model of the arm, evaluated at one state (`surgsim.tick.nominal`).
+
+    Attributes:
+        model: Address of MuJoCo's model.
+        data: Address of MuJoCo's data, of this record alone.
+        qpos: Address of the joint positions in it; as the next five, of what it says by that name.
+        qvel: Of the joint velocities.
+        site_xpos: Of the tip's place.
+        site_xmat: Of the tip's orientation.
+        xaxis: Of the joint axes.
+        xanchor: Of the points on them.
+        site: The tip's site.
+        q: Joint positions of the evaluation (n,) [rad].
+        v: Joint velocities of the evaluation (n,) [rad/s].
+        p_WT: Tip position (3,) [m].
+        R_WT: Tip orientation (3, 3); its third column is the shaft axis.
+        Jv_WT: Translational tip Jacobian (3, n) [m/rad].
+        Jw_WT: Rotational tip Jacobian (3, n).
+        z_W: Joint axes as rows (n, 3), unit.
+        anchors_W: Points on the joint axes as rows (n, 3) [m].
+        M: Joint-space inertia with armature (n, n) [kg m^2].
+        bias: Coriolis, centrifugal and gravity torque (n,) [N m].
+        damping: Viscous joint damping (n,) [N m s/rad].
+    """
+
+    SHAPES: ClassVar[dict[str, str]] = {
+        "q": "n",
+        "v": "n",
+        "p_WT": "3",
+        "R_WT": "3 3",
+        "Jv_WT": "3 n",
+        "Jw_WT": "3 n",
+        "z_W": "n 3",
+        "anchors_W": "n 3",
+        "M": "n n",
+        "bias": "n",
+        "damping": "n",
+    }
+    model: int
+    data: int
+    qpos: int
+    qvel: int
+    site_xpos: int
+    site_xmat: int
+    xaxis: int
+    xanchor: int
+    site: int
+    q: Array
+    v: Array
+    p_WT: Array
+    R_WT: Array
+    Jv_WT: Array
+    Jw_WT: Array
+    z_W: Array
+    anchors_W: Array
+    M: Array
+    bias: Array
+    damping: Array
+
+
+class Seen(Record):
+    """All that a controller's part may use at a tick: what is measured, the nominal model there, the command.
+
+    Attributes:
+        t_s: Time since the start [s].
+        dt_s: Control period [s].
+        first: 1 at the first tick after a reset, else 0: the memory is all zeros then.
+        has_trocar: 1 with a trocar, else 0 and nothing is said of it.
+        rows: RCM rows: 2, or 0 without a trocar.
+        depth: Insertion depth [m].
+        roll_rate: Commanded turn about the shaft [rad/s].
+        jaw: How far the jaws close, from 0 to 1.
+        budget_j: Energy that may be given to the surroundings in this period [J]; infinite: no limit.
+        omega_gain: alpha of Omega [1/s].
+        q: Joint positions at which the kinematics were evaluated (n,) [rad].
+        v: Joint velocities there (n,) [rad/s].
+        tau: Joint torques that were measured over the last period (n,) [N m].
+        f_T: Measured force of the surroundings on the tip (3,) [N].
+        p_WT: Tip position (3,) [m].
+        R_WT: Tip orientation (3, 3); its third column is the shaft axis.
+        Jv_WT: Translational tip Jacobian (3, n) [m/rad].
+        Jw_WT: Rotational tip Jacobian (3, n).
+        z_W: Joint axes as rows (n, 3), unit.
+        anchors_W: Points on the joint axes as rows (n, 3) [m].
+        M: Inertia with armature (n, n) [kg m^2]; not filled on the kinematic plant.
+        bias: Coriolis, centrifugal and gravity torque (n,) [N m]; not filled on the kinematic plant.
+        damping: Viscous joint damping of the nominal model (n,) [N m s/rad].
+        p_WC: Trocar position (3,) [m]; NaN without one. A port estimator sees the measured one, the other
+            parts the estimate, shifted if the command says so.
+        v_WC: Trocar velocity (3,) [m/s].
+        a_WC: Trocar acceleration (3,) [m/s^2].
+        rcm_error: e_N (2,) [m].
+        J_rcm: RCM Jacobian (2, n) [m/rad].
+        rcm_velocity: N C' (2,) [m/s].
+        normals: N (2, 3), unit rows normal to the shaft.
+        p_WTd: Commanded tip position (3,) [m]; a torque law sees the motion that the resolver follows.
+        v_WTd: Commanded tip velocity (3,) [m/s].
+        a_WTd: Commanded tip acceleration (3,) [m/s^2].
+        budget_f_T: Force on the tip that the budget is reckoned with (3,) [N].
+        lower: Lower velocity bounds Omega (n,) [rad/s].
+        upper: Upper velocity bounds Omega (n,) [rad/s].
+        q_min: Joint range (n,) [rad].
+        q_max: Joint range (n,) [rad].
+        v_max: Joint velocity limits (n,) [rad/s].
+        a_max: Joint acceleration limits (n,) [rad/s^2].
+        tau_max: Joint torque limits (n,) [N m].
+        qdot_ref: The resolver's answer (n,) [rad/s]; of the last tick, for the resolver itself.
+        q_ref: Joint reference, integrated from them (n,) [rad].
+        elsewhere: The nominal model to be evaluated at other states.
+    """
+
+    SHAPES: ClassVar[dict[str, str]] = {
+        **{name: shape for name, shape in Model.SHAPES.items()},
+        "tau": "n",
+        "f_T": "3",
+        "p_WC": "3",
+        "v_WC": "3",
+        "a_WC": "3",
+        "rcm_error": "2",
+        "J_rcm": "2 n",
+        "rcm_velocity": "2",
+        "normals": "2 3",
+        "p_WTd": "3",
+        "v_WTd": "3",
+        "a_WTd": "3",
+        "budget_f_T": "3",
+        "lower": "n",
+        "upper": "n",
+        "q_min": "n",
+        "q_max": "n",
+        "v_max": "n",
+        "a_max": "n",
+        "tau_max": "n",
+        "qdot_ref": "n",
+        "q_ref": "n",
+    }
+    t_s: float
+    dt_s: float
+    first: int
+    has_trocar: int
+    rows: int
+    depth: float
+    roll_rate: float
+    jaw: float
+    budget_j: float
+    omega_gain: float
+    q: Array
+    v: Array
+    tau: Array
+    f_T: Array
+    p_WT: Array
+    R_WT: Array
+    Jv_WT: Array
+    Jw_WT: Array
+    z_W: Array
+    anchors_W: Array
+    M: Array
+    bias: Array
+    damping: Array
+    p_WC: Array
+    v_WC: Array
+    a_WC: Array
+    rcm_error: Array
+    J_rcm: Array
+    rcm_velocity: Array
+    normals: Array
+    p_WTd: Array
+    v_WTd: Array
+    a_WTd: Array
+    budget_f_T: Array
+    lower: Array
+    upper: Array
+    q_min: Array
+    q_max: Array
+    v_max: Array
+    a_max: Array
+    tau_max: Array
+    qdot_ref: Array
+    q_ref: Array
+    elsewhere: Model
+
+
+class Resolved(Record):
+    """Where a resolver's answer goes.
+
+    Attributes:
+        residual: Norm of the task and RCM rows that it leaves unmet [m/s].
+        qdot: Joint velocities inside the bounds (n,) [rad/s].
+        p_WTd: Tip motion that they follow, for the torque law (3,) [m]; the command's unless written.
+        v_WTd: (3,) [m/s].
+        a_WTd: (3,) [m/s^2].
+        values: Values of the resolver's own columns, as many as it has.
+    """
+
+    SHAPES: ClassVar[dict[str, str]] = {
+        "qdot": "n",
+        "p_WTd": "3",
+        "v_WTd": "3",
+        "a_WTd": "3",
+        "values": str(MOST_VALUES),
+    }
+    residual: float
+    qdot: Array
+    p_WTd: Array
+    v_WTd: Array
+    a_WTd: Array
+    values: Array
+
+
+class Feedback(Record):
+    """What a task is told at a tick: the time, and for one that reacts the instrument as measured.
+
+    Attributes:
+        t_s: Time [s].
+        p_WT: Tip position (3,) [m].
+        v_WT: Tip velocity (3,) [m/s].
+        R_WT: Tip orientation (3, 3).
+        w_WT: Angular velocity of the instrument (3,) [rad/s].
+        f_T: Measured force of the surroundings on the tip (3,) [N].
+    """
+
+    SHAPES: ClassVar[dict[str, str]] = {"p_WT": "3", "v_WT": "3", "R_WT": "3 3", "w_WT": "3", "f_T": "3"}
+    t_s: float
+    p_WT: Array
+    v_WT: Array
+    R_WT: Array
+    w_WT: Array
+    f_T: Array
+
+
+class Command(Record):
+    """Where a task's command goes.
+
+    Attributes:
+        roll_rate: Turn about the shaft [rad/s].
+        jaw: How far the jaws close, from 0 to 1.
+        budget_j: Energy that the controller may spend [J]; infinite: no limit.
+        finished: 1 where there is nothing left to do.
+        p_WTd: Tip position (3,) [m].
+        v_WTd: Tip velocity (3,) [m/s].
+        a_WTd: Tip acceleration (3,) [m/s^2].
+        budget_f_T: Force on the tip that the budget is reckoned with (3,) [N].
+        rcm_shift: From the trocar to the point that the shaft is held through in its place (3,) [m].
+        rcm_shift_rate: Its rate of change (3,) [m/s].
+        values: Values of the task's own columns, as many as it has.
+    """
+
+    SHAPES: ClassVar[dict[str, str]] = {
+        "p_WTd": "3",
+        "v_WTd": "3",
+        "a_WTd": "3",
+        "budget_f_T": "3",
+        "rcm_shift": "3",
+        "rcm_shift_rate": "3",
+        "values": str(MOST_VALUES),
+    }
+    roll_rate: float
+    jaw: float
+    budget_j: float
+    finished: int
+    p_WTd: Array
+    v_WTd: Array
+    a_WTd: Array
+    budget_f_T: Array
+    rcm_shift: Array
+    rcm_shift_rate: Array
+    values: Array
+
+
+class Control(Record):
+    """A controller at a tick.
+
+    Attributes:
+        has_law: Whether there is a torque law, else 0.
+        at_reference: Whether the resolver's kinematics are those of the joint reference.
+        who: Written: the part that a status other than GOES_ON came from.
+        q_ref: Joint reference at this tick (n,) [rad].
+        torque: Sum of the law's terms (n,) [N m].
+        port: Rows position, velocity and acceleration of the estimated port (3, 3).
+        command: The task's command.
+        seen: What the parts see, one after the other: port estimator, resolver, torque law.
+        referred: What the resolver sees where it is evaluated at the joint reference.
+        measured: The nominal model at the measured state.
+        reference: The nominal model at the joint reference.
+        resolved: The resolver's answer.
+    """
+
+    SHAPES: ClassVar[dict[str, str]] = {"q_ref": "n", "torque": "n", "port": "3 3"}
+    has_law: int
+    at_reference: int
+    who: int
+    q_ref: Array
+    torque: Array
+    port: Array
+    command: Command
+    seen: Seen
+    referred: Seen
+    measured: Model
+    reference: Model
+    resolved: Resolved
+
+
+class World(Record):
+    """The plant: where MuJoCo's arrays are, and what the plant's parts act on.
+
+    MuJoCo's own arrays are read through the functions of `surgsim.tick.views`.
+
+    Attributes:
+        model: Address of MuJoCo's model.
+        data: Address of MuJoCo's data.
+        xaxis: Address of the joints' axes; as the following, of the array of MuJoCo's data by that name.
+        xanchor: Points on them.
+        qpos: All positions.
+        qvel: All velocities.
+        ctrl: All controls.
+        qfrc_bias: Bias torques.
+        qfrc_applied: Applied generalized forces, zeroed before every step.
+        xfrc_applied: Applied forces and torques on bodies, zeroed before every step.
+        xpos: Body places.
+        xquat: Body orientations, wxyz.
+        xmat: Body orientations.
+        xipos: Centres of mass.
+        site_xpos: Site places.
+        site_xmat: Site orientations.
+        cfrc_ext: External forces on bodies.
+        mocap_pos: Places of the mocap bodies.
+        sensordata: Sensors.
+        nq: Positions.
+        nv: Velocities.
+        nbody: Bodies.
+        nsite: Sites.
+        njnt: Joints.
+        first_qpos: Where the arm's positions begin.
+        first_dof: Where its velocities begin.
+        first_ctrl: Where its motors begin.
+        first_joint: Where its joints begin.
+        tip: Site of the tip.
+        entry: Site of the shaft's entry.
+        trocar: Site of the trocar, or -1.
+        jaws: Body of the jaws, or -1.
+        mocap: The port's mocap row, or -1.
+        substeps: Physics steps in a control period.
+        disturbed: Whether there are parts or a wall.
+        touched: Whether the tip can be touched.
+        walled: Whether there is a physical wall.
+        tick: Control ticks since the reset.
+        t_s: Time of the state [s].
+        step_s: Time of the physics step [s].
+        dt_s: Control period [s].
+        timestep_s: Physics step [s].
+        jaw: How far the jaws are told to close.
+        tau_max: Torque limits (n,) [N m].
+        torque: Torque on its way to the joints (n,) [N m].
+        qdot: The resolver's velocities (n,) [rad/s].
+        q: True joint positions (n,) [rad].
+        v: True joint velocities (n,) [rad/s].
+        tau: Torque that the actuators gave over the last period (n,) [N m].
+        p_WT: Tip (3,) [m].
+        p_WR: A second point of the shaft axis (3,) [m].
+        p_WC: Trocar, or NaN (3,) [m].
+        f_C: Force of the shaft on the wall, or NaN (3,) [N].
+        f_T: Force of the surroundings on the tip (3,) [N].
+        port_home: Configured place of the port (3,) [m].
+        port_offset: How far the port's place of rest has moved (3,) [m].
+        port_velocity: Its velocity (3,) [m/s].
+        q_m: Measured joint positions (n,) [rad].
+        v_m: Measured joint velocities (n,) [rad/s].
+        tau_m: Measured joint torques (n,) [N m].
+        p_WC_m: Trocar as the controller is told (3,) [m].
+        v_WC_m: Trocar's velocity as announced (3,) [m/s].
+        f_T_m: Measured force on the tip (3,) [N].
+    """
+
+    SHAPES: ClassVar[dict[str, str]] = {
+        **{name: "n" for name in ("tau_max", "torque", "qdot", "q", "v", "tau", "q_m", "v_m", "tau_m")},
+        **{name: "3" for name in ("p_WT", "p_WR", "p_WC", "f_C", "f_T", "p_WC_m", "v_WC_m", "f_T_m")},
+        **{name: "3" for name in ("port_home", "port_offset", "port_velocity")},
+    }
+    model: int
+    data: int
+    xaxis: int
+    xanchor: int
+    qpos: int
+    qvel: int
+    ctrl: int
+    qfrc_bias: int
+    qfrc_applied: int
+    xfrc_applied: int
+    xpos: int
+    xquat: int
+    xmat: int
+    xipos: int
+    site_xpos: int
+    site_xmat: int
+    cfrc_ext: int
+    mocap_pos: int
+    sensordata: int
+    nq: int
+    nv: int
+    nbody: int
+    nsite: int
+    njnt: int
+    first_qpos: int
+    first_dof: int
+    first_ctrl: int
+    first_joint: int
+    tip: int
+    entry: int
+    trocar: int
+    jaws: int
+    mocap: int
+    substeps: int
+    disturbed: int
+    touched: int
+    walled: int
+    tick: int
+    t_s: float
+    step_s: float
+    dt_s: float
+    timestep_s: float
+    jaw: float
+    tau_max: Array
+    torque: Array
+    qdot: Array
+    q: Array
+    v: Array
+    tau: Array
+    p_WT: Array
+    p_WR: Array
+    p_WC: Array
+    f_C: Array
+    f_T: Array
+    port_home: Array
+    port_offset: Array
+    port_velocity: Array
+    q_m: Array
+    v_m: Array
+    tau_m: Array
+    p_WC_m: Array
+    v_WC_m: Array
+    f_T_m: Array
+
+
+@cache
+def resolver_signature(n: int) -> Any:
+    """Status = step(gains, seen, memory, out: Resolved)."""
+    return types.int64(A1, type_of(Seen, n), A1, type_of(Resolved, n))
+
+
+@cache
+def law_signature(n: int) -> Any:
+    """Status = torque(gains, seen, memory, out: terms of the torque as rows (k, n)).
+
+    Of a port estimator too: out has the rows position, velocity and acceleration (3, 3).
+    """
+    return types.int64(A1, type_of(Seen, n), A1, A2)
+
+
+@cache
+def task_signature() -> Any:
+    """Status = command(gains, feedback, memory, out: Command)."""
+    return types.int64(A1, type_of(Feedback, 0), A1, type_of(Command, 0))
+
+
+@cache
+def hook_signature(n: int) -> Any:
+    """Status = hook(gains, world, memory, out: the part's columns (k,)), of a disturbance or prop."""
+    return types.int64(A1, type_of(World, n), A1, A1)

@@ -1,0 +1,64 @@
+"""The nominal model of the arm, evaluated from compiled code."""
+
+from typing import Any
+
+from surgsim.compiled import compiled
+from surgsim.tick.arrays import Array, Model
+from surgsim.tick.mujoco_calls import (
+    mj_comPos,
+    mj_comVel,
+    mj_fullM,
+    mj_jacSite,
+    mj_kinematics,
+    mj_makeM,
+    mj_rne,
+)
+from surgsim.tick.views import doubles, vector
+
+
+@compiled
+def kinematics(model: Model, q: Array) -> None:
+    """Evaluate the kinematics at `q` (n,) [rad]."""
+    n = q.size
+    qpos = vector(model.qpos, n)
+    for i in range(n):
+        qpos[i] = model.q[i] = q[i]
+    mj_kinematics(model.model, model.data)
+    mj_comPos(model.model, model.data)
+    mj_jacSite(model.model, model.data, model.Jv_WT.ctypes.data, model.Jw_WT.ctypes.data, model.site)
+    place, turn = vector(model.site_xpos, 3), doubles(model.site_xmat, 3, 3)
+    axes, anchors = doubles(model.xaxis, n, 3), doubles(model.xanchor, n, 3)
+    for k in range(3):
+        model.p_WT[k] = place[k]
+        for i in range(3):
+            model.R_WT[i, k] = turn[i, k]
+        for i in range(n):
+            model.z_W[i, k] = axes[i, k]
+            model.anchors_W[i, k] = anchors[i, k]
+
+
+@compiled
+def dynamics(model: Model, v: Array) -> None:
+    """Evaluate inertia and bias for the velocities `v` (n,) [rad/s]; after `kinematics`."""
+    qvel = vector(model.qvel, v.size)
+    for i in range(v.size):
+        qvel[i] = model.v[i] = v[i]
+    mj_comVel(model.model, model.data)
+    mj_rne(model.model, model.data, 0, model.bias.ctypes.data)
+    mj_makeM(model.model, model.data)
+    mj_fullM(model.model, model.data, model.M.ctypes.data)
+
+
+@compiled
+def copy_model(a: Any, b: Any) -> None:
+    """Copy what was evaluated from a record with a model's fields to another."""
+    b.q[:] = a.q
+    b.v[:] = a.v
+    b.p_WT[:] = a.p_WT
+    b.R_WT[:] = a.R_WT
+    b.Jv_WT[:] = a.Jv_WT
+    b.Jw_WT[:] = a.Jw_WT
+    b.z_W[:] = a.z_W
+    b.anchors_W[:] = a.anchors_W
+    b.M[:] = a.M
+    b.bias[:] = a.bias

@@ -1,0 +1,72 @@
+"""A Python part as a kernel of the compiled loop.
+
+The loop knows kernels alone. For a part that is Python by nature it is given the trampoline of its kind, whose
+gains hold the address of a C function that enters Python. The part shares its arrays with the loop, so
+nothing is handed over but the call. An exception cannot pass through compiled code: it is kept, the tick ends
+with the status `TOLD`, and whoever runs the loop raises it again.
+"""
+
+import ctypes
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from llvmlite import ir
+from numba import types
+from numba.extending import intrinsic
+
+from surgsim.compiled import compiled
+from surgsim.tick.arrays import Array
+from surgsim.tick.status import GOES_ON, TOLD
+
+_CALL = ctypes.CFUNCTYPE(ctypes.c_int64)
+
+
+class PythonPart:
+    """Enters Python from a compiled loop, and keeps what went wrong there.
+
+    Args:
+        call: What is called each time; it returns a status, or None for `GOES_ON`.
+
+    Attributes:
+        gains: The trampoline's gains: the address of the C function (1,).
+        error: What `call` raised, until it is taken by `raised`.
+    """
+
+    def __init__(self, call: Callable[[], int | None]) -> None:
+        self._call = call
+        self._entry = _CALL(self._enter)
+        address = ctypes.cast(self._entry, ctypes.c_void_p).value
+        self.gains: Array = np.array([address], dtype=np.int64).view(np.float64)
+        self.error: BaseException | None = None
+
+    def _enter(self) -> int:
+        try:
+            status = self._call()
+        except BaseException as error:  # an exception that leaves here is printed and lost
+            self.error = error
+            return TOLD
+        return GOES_ON if status is None else int(status)
+
+    def raised(self) -> BaseException | None:
+        """The exception since the last call of this, if any."""
+        error, self.error = self.error, None
+        return error
+
+
+@intrinsic
+def _enter_address(context: Any, address: Any) -> Any:
+    """Call the C function `int64 f(void)` at an address that is stored in the bits of a float."""
+
+    def generate(_: Any, builder: Any, signature: Any, values: Any) -> Any:
+        function = ir.FunctionType(ir.IntType(64), [])
+        bits = builder.bitcast(values[0], ir.IntType(64))
+        return builder.call(builder.inttoptr(bits, function.as_pointer()), [])
+
+    return types.int64(types.float64), generate
+
+
+@compiled
+def python_kernel(gains: Any, seen: Any, memory: Any, out: Any) -> int:
+    """The trampoline of every kind of kernel: ask the Python part whose address is the first gain."""
+    return _enter_address(gains[0])

@@ -1,0 +1,11 @@
+"""What a kernel answers: 0 goes on, anything else stops the tick."""
+
+GOES_ON = 0
+INFEASIBLE = 1
+"""No command meets the hard constraints."""
+RANK_LOST = 2
+"""A Jacobian that has to be inverted has lost rank."""
+DIVERGED = 3
+"""A state of the part has grown past all bounds."""
+TOLD = 4
+"""A Python part says why itself (`surgsim.tick.python_part`)."""

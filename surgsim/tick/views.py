@@ -1,0 +1,72 @@
+"""MuJoCo's arrays as kernels see them: by the address of their first entry."""
+
+import ctypes
+from typing import Any
+
+import numpy as np
+from numba import carray, types
+from numba.core import cgutils
+from numba.extending import intrinsic, overload
+
+from surgsim.compiled import compiled
+from surgsim.tick.arrays import Array, World
+
+
+@intrinsic
+def _pointer(context: Any, address: Any) -> Any:
+    """The address as a pointer."""
+
+    def generate(_: Any, builder: Any, signature: Any, values: Any) -> Any:
+        return builder.inttoptr(values[0], cgutils.voidptr_t)
+
+    return types.voidptr(types.int64), generate
+
+
+def doubles(address: int, rows: int, columns: int) -> Array:
+    """The doubles at `address` as an array (rows, columns), not copied."""
+    pointer = ctypes.cast(int(address), ctypes.POINTER(ctypes.c_double))
+    return np.ctypeslib.as_array(pointer, (int(rows), int(columns)))
+
+
+@overload(doubles)
+def _doubles(address: Any, rows: Any, columns: Any) -> Any:
+    def view(address: Any, rows: Any, columns: Any) -> Any:
+        return carray(_pointer(address), (rows, columns), np.float64)
+
+    return view
+
+
+@compiled
+def vector(address: int, size: int) -> Array:
+    """The doubles at `address` as an array (size,), not copied."""
+    return doubles(address, 1, size)[0]
+
+
+@compiled
+def applied_wrench(world: World, body: int) -> Array:
+    """Applied force and torque on a body (6,) [N, N m], about its centre of mass, world frame."""
+    return doubles(world.xfrc_applied, world.nbody, 6)[body]
+
+
+@compiled
+def body_place(world: World, body: int) -> Array:
+    """Place of a body (3,) [m]."""
+    return doubles(world.xpos, world.nbody, 3)[body]
+
+
+@compiled
+def centre_of_mass(world: World, body: int) -> Array:
+    """Centre of mass of a body (3,) [m]."""
+    return doubles(world.xipos, world.nbody, 3)[body]
+
+
+@compiled
+def site_place(world: World, site: int) -> Array:
+    """Place of a site (3,) [m]."""
+    return doubles(world.site_xpos, world.nsite, 3)[site]
+
+
+@compiled
+def site_turn(world: World, site: int) -> Array:
+    """Orientation of a site (9,), row by row."""
+    return doubles(world.site_xmat, world.nsite, 9)[site]
