@@ -42,7 +42,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def execute(options: argparse.Namespace) -> int:
-    """Run the suite; 0 when its table is whole, 1 while other shards are missing."""
+    """Run the suite; 0 when its table is whole, 1 while other shards are missing or if a run crashed."""
     from surgsim.cli.output import show_batch_progress
     from surgsim.compare.engine import Batch, compare
     from surgsim.report.write import write_report
@@ -71,7 +71,20 @@ def execute(options: argparse.Namespace) -> int:
     _print(table, options)
     print(f"{table.num_rows} runs; wrote {out / 'runs.parquet'} and runs.csv", file=sys.stderr)
     print(f"wrote {write_report(out)}", file=sys.stderr)
-    return 0
+    return _tell_broken(table)
+
+
+def _tell_broken(table: Any) -> int:
+    """Say which runs broke surgsim itself; 1 if there are any, else 0."""
+    from surgsim.compare.job import broken
+
+    runs = broken(table)
+    if not runs:
+        return 0
+    named = ", ".join(runs[:3]) + (f" and {len(runs) - 3} more" if len(runs) > 3 else "")
+    text = f"{len(runs)} of {table.num_rows} runs crashed or lost their worker: {named}"
+    print(f"surgsim: {text}; outcome_detail in runs.csv says how", file=sys.stderr)
+    return 1
 
 
 def _check(options: argparse.Namespace) -> None:

@@ -3,6 +3,7 @@
 import traceback
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from surgsim.errors import Outcome, SurgsimError
 from surgsim.runs.folder import execute, summary_of, whole_folder, write_run, write_summary
@@ -92,5 +93,13 @@ _SENTENCES = {
     WORKER_DIED: "The process that ran it died at every try.",
     CRASHED: "The run raised an error inside surgsim: a bug.",
 }
+BROKEN = frozenset({WORKER_DIED, CRASHED})
+"""Ways of ending that are faults of surgsim or the machine, not results."""
 OUTCOMES = frozenset({*(outcome.name.lower() for outcome in Outcome), *_SENTENCES})
 """Every way in which a run of a batch can end."""
+
+
+def broken(table: Any) -> list[str]:
+    """Ids of the runs in a batch's table that crashed or whose worker died."""
+    pairs = zip(table["run_id"].to_pylist(), table["outcome"].to_pylist(), strict=True)
+    return [run_id for run_id, outcome in pairs if outcome in BROKEN]

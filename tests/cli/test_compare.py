@@ -12,7 +12,9 @@ from pathlib import Path
 import pytest
 
 from surgsim.cli.main import main
+from surgsim.compare.job import CRASHED, WORKER_DIED, do, write_failure
 from surgsim.compare.table import read_table
+from surgsim.compare.workers import Done
 
 SUITE = """\
 name: tiny
@@ -171,3 +173,29 @@ def test_what_is_wrong_is_said_before_anything_is_run(capsys, monkeypatch, tmp_p
     assert error.startswith(f"surgsim: {text}")
     assert error.count("\n") == 1
     assert [path.name for path in tmp_path.iterdir()] == ["other.txt"]
+
+
+def test_a_batch_with_crashed_runs_is_no_success(capsys, monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "tiny.yaml").write_text(SUITE)
+
+    def runner(options):
+        def run(jobs, count):
+            ends = [CRASHED, "completed", WORKER_DIED, "completed"]
+            for index, (job, end) in enumerate(zip(jobs, ends, strict=True)):
+                if end == "completed":
+                    yield Done(index=index, outcome=do(job))
+                else:
+                    write_failure(job.scenario(), Path(job.folder), end, "by the test")
+                    yield Done(index=index, outcome=end)
+
+        return run
+
+    monkeypatch.setattr("surgsim.cli.compare._runner", runner)
+    assert main(["compare", "tiny.yaml"]) == 1
+    error = capsys.readouterr().err.splitlines()
+    assert error[-1] == (
+        "surgsim: 2 of 4 runs crashed or lost their worker: circle_lwr4plus/pinv/base-seed0, "
+        "circle_lwr4plus/vprnn/base-seed0; outcome_detail in runs.csv says how"
+    )
+    assert (tmp_path / "runs" / "suites" / "tiny" / "report.html").is_file()
