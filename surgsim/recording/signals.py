@@ -1,4 +1,7 @@
-"""The signals of a recording: every column of the trace, the errors in millimetres, and the limits."""
+"""The signals that the viewer plots: the trace's columns, the errors in millimetres, and the limits.
+
+They are for the eye: `polyline` chooses which rows are drawn. The whole trace is packed in the header.
+"""
 
 from collections.abc import Sequence
 
@@ -7,7 +10,8 @@ import rerun as rr
 
 from surgsim.columns import Block
 from surgsim.recording import palette
-from surgsim.recording.layout import ERRORS, LIMITS, TIMELINE, series_path, timestamps
+from surgsim.recording.layout import ERRORS, LIMITS, TIMELINE, Durations, series_path, timestamps
+from surgsim.recording.polyline import drawn_rows
 from surgsim.trace.trace import Array, Trace
 
 _SCALAR_COLORS = {
@@ -18,14 +22,29 @@ _SCALAR_COLORS = {
 
 
 def log_signals(stream: rr.RecordingStream, trace: Trace) -> None:
-    """Send every block at every control tick, then what is derived for the plots."""
-    times = [rr.TimeColumn(TIMELINE, duration=timestamps(trace["t_s"]))]
-    for block in trace.blocks:
+    """Send every block but the time, then what is derived for the plots."""
+    times = timestamps(trace["t_s"])
+    for block in trace.blocks[1:]:
         values = trace.block(block.name)
-        _send(stream, series_path(block.name), times, values, names=_names(block), colors=_colors(block))
+        _draw(stream, series_path(block.name), times, values, names=_names(block), colors=_colors(block))
     errors = 1e3 * np.stack([trace["tip_error_m"], trace["rcm_error_m"]], axis=1)
-    _send(stream, ERRORS, times, errors, names=["tip", "RCM"], colors=[palette.SKY, palette.ORANGE])
+    _draw(stream, ERRORS, times, errors, names=["tip", "RCM"], colors=[palette.SKY, palette.ORANGE])
     _log_limits(stream, trace)
+
+
+def _draw(
+    stream: rr.RecordingStream,
+    path: str,
+    times: Durations,
+    values: Array,
+    *,
+    names: Sequence[str],
+    colors: Sequence[tuple[int, int, int]],
+) -> None:
+    """Send those rows of `values` (rows, series) that show them."""
+    rows = drawn_rows(values)
+    columns = [rr.TimeColumn(TIMELINE, duration=times[rows])]
+    _send(stream, path, columns, values[rows], names=names, colors=colors)
 
 
 def _send(
