@@ -2,9 +2,6 @@
 
 import hashlib
 import json
-import os
-import shutil
-import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,7 +15,11 @@ from surgsim.compare.suite import RunSpec, SuiteConfig, check_runs, expand
 from surgsim.compare.table import Row, write_table
 from surgsim.compare.workers import Done, run_jobs
 from surgsim.errors import SurgsimError
+from surgsim.recording.files import replacing, write_file
 from surgsim.recording.sealed import read_sealed, sealed
+from surgsim.runs.contents import fault_of, make_folder
+from surgsim.runs.drafts import clear_drafts
+from surgsim.runs.exchange import restore_all
 from surgsim.runs.provenance import provenance
 from surgsim.scenario.schema import Scenario
 
@@ -90,16 +91,18 @@ def compare(batch: Batch, report: Report | None = None, runner: Runner = run_job
 def is_whole(folder: Path, scenario: Scenario, record: bool, code: Code | None = None) -> bool:
     """Whether `folder` holds the run of exactly this scenario, with its recording if one is wanted.
 
+    Every file of it must be as it was written.
+
     With `code`, the run must also have been made by it.
     """
     try:
         summary = read_sealed(folder / "metrics.json")
         same = code is None or _code(summary["provenance"]) == code
         same = same and summary["provenance"]["scenario_sha256"] == scenario.sha256()
-        recorded = not record or not summary["metrics"] or (folder / "recording.rrd").is_file()
+        recorded = not record or not summary["metrics"] or "recording.rrd" in summary["files"]
+        return bool(same and recorded) and not fault_of(folder, summary)
     except (OSError, ValueError, KeyError, TypeError):
         return False
-    return bool(same and recorded)
 
 
 def _code(origin: Mapping[str, Any]) -> Code:
@@ -143,17 +146,13 @@ def _prepare(batch: Batch) -> None:
         "settings": list(batch.suite.settings),
     }
     try:
-        out.mkdir(parents=True, exist_ok=True)
+        make_folder(out)
         if any(not path.name.startswith(_DRAFT) for path in out.iterdir()):
             _check_old(batch, about)
-        if batch.shard[1] == 1:  # other shards may be writing now
-            _clear(out)
+        _clear(out)
         whole = sealed({**about, "command": batch.command, "provenance": provenance()})
-        handle, draft = tempfile.mkstemp(prefix=_DRAFT, suffix=".part", dir=out)
-        with os.fdopen(handle, "w") as stream:
-            stream.write(json.dumps(whole, indent=2) + "\n")
-        os.chmod(draft, 0o644)
-        os.replace(draft, file)
+        with replacing(file) as draft:
+            write_file(draft, json.dumps(whole, indent=2) + "\n")
     except OSError as error:
         raise SurgsimError(f"cannot write {out}: {error.strerror or error}") from error
 
@@ -182,8 +181,7 @@ def _check_old(batch: Batch, about: Mapping[str, Any]) -> None:
 
 
 def _clear(out: Path) -> None:
-    """Remove what killed runs left half done."""
-    for left in [*out.glob("runs/*/*/.*.part"), *out.glob("runs/*/*/.*.old")]:
-        shutil.rmtree(left, ignore_errors=True)
-    for left in [*out.glob(f"{_DRAFT}*.part"), *out.glob(".runs.*.partial")]:
-        left.unlink(missing_ok=True)
+    """Remove what killed runs left half done; bring back what one had set aside."""
+    for parent in out.glob("runs/*/*"):
+        clear_drafts(parent)
+        restore_all(parent)

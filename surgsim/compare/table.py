@@ -15,7 +15,7 @@ from surgsim.compare.job import OUTCOMES
 from surgsim.errors import SurgsimError, unknown_name
 from surgsim.metrics.catalog import METRICS
 from surgsim.metrics.timing import TIMING_METRICS
-from surgsim.recording.files import replacing
+from surgsim.recording.files import replacing, write_file
 from surgsim.recording.sealed import read_sealed
 from surgsim.runs.folder import SCHEMA_VERSION
 from surgsim.scenario.wording import one_line
@@ -99,9 +99,12 @@ def write_table(root: Path, rows: Sequence[Row]) -> pa.Table:
     """
     parts = [_part(root, row) for row in rows]
     table = pa.Table.from_batches(parts, schema=schema())
-    for name, write in ((PARQUET, pa.parquet.write_table), (CSV, pa.csv.write_csv)):
-        with replacing(root / name) as draft:  # two shards may end at the same time
-            write(sealed_table(table), draft)
+    # The Parquet file is last: with it the batch is finished. Two shards may end at the same time.
+    for name, write in ((CSV, pa.csv.write_csv), (PARQUET, pa.parquet.write_table)):
+        content = pa.BufferOutputStream()
+        write(sealed_table(table), content)
+        with replacing(root / name) as draft:
+            write_file(draft, content.getvalue().to_pybytes())
     return table
 
 

@@ -7,6 +7,10 @@ from dataclasses import dataclass
 from surgsim.trace.trace import Trace
 
 
+class Undefined(Exception):
+    """A metric has no value for a run, for a reason that a person is told."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class Metric:
     """A named figure of a run.
@@ -14,7 +18,7 @@ class Metric:
     Attributes:
         name: Name with its unit suffix, as in `metrics.json`.
         meaning: One line for a person.
-        compute: Value from a trace; NaN where the trace does not define it.
+        compute: Value from a trace; NaN where the trace does not define it, `Undefined` with a reason.
         lower_is_better: Direction for rankings; None where there is none.
         whole: Whether it is of the whole trace, and not of the run without the stop after its outcome.
         digits: Significant digits worth printing.

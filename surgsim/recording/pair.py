@@ -7,13 +7,12 @@ from typing import Any
 import rerun as rr
 import rerun.blueprint as rrb
 
-from surgsim.errors import RecordingError
 from surgsim.recording.blueprint import plot, scene_view, texts_view
-from surgsim.recording.files import replacing
-from surgsim.recording.layout import APPLICATION, ERRORS, LIMITS, TIMELINE, series_path
+from surgsim.recording.layout import ERRORS, LIMITS, TIMELINE, series_path
 from surgsim.recording.read import Recorded
 from surgsim.recording.scene import log_scene, scenario_of
 from surgsim.recording.signals import log_signals
+from surgsim.recording.stream import stream_to
 from surgsim.recording.write import log_texts
 from surgsim.trace.trace import Trace
 
@@ -24,23 +23,16 @@ def write_pair(path: Path, pair: Sequence[Recorded]) -> None:
     """Write two runs into one recording, each below an entity of its own, with a layout of two columns.
 
     Raises:
-        RecordingError: If the file cannot be written whole.
+        SurgsimError: If the file cannot be written.
     """
-    stream = rr.RecordingStream(APPLICATION, send_properties=False)
     traces = [recorded.trace for recorded in pair]
-    with replacing(path) as temporary:
-        stream.save(temporary, default_blueprint=_blueprint(traces))
+    with stream_to(path, _blueprint(traces)) as stream:
         stream.send_recording_name(" | ".join(title(trace) for trace in traces))
         for side, recorded in zip(_SIDES, pair, strict=True):
             below, trace = _Below(stream, side), recorded.trace
             log_signals(below, trace)
             log_scene(below, scenario_of(trace), trace)
             log_texts(below, trace.meta, recorded.metrics)
-        try:
-            stream.flush()
-            stream.disconnect()
-        except RuntimeError as error:
-            raise RecordingError(f"{path}: cannot be written whole; is the disk full? ({error})") from error
 
 
 def title(trace: Trace) -> str:

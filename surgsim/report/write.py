@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from pathlib import Path
 
-from surgsim.recording.files import replacing
+from surgsim.recording.files import replacing, write_file
 from surgsim.report.page import page
 from surgsim.report.results import read_results
 from surgsim.report.series import read_series
@@ -34,5 +34,5 @@ def write_report(folder: Path, out: Path | None = None, say: Callable[[str], Non
     series = read_series(folder, results.rows, results.runs.scenarios, say)
     text = page(results, series, file)
     with replacing(file) as draft:
-        draft.write_text(text, encoding="utf-8")
+        write_file(draft, text)
     return file

@@ -162,6 +162,19 @@ def spoil_json(folder):
     (folder / "metrics.json").write_text(text[: len(text) // 2])
 
 
+def empty_scenario(folder):
+    (folder / "scenario.yaml").write_bytes(b"")
+
+
+def change_a_letter(folder):
+    text = (folder / "scenario.yaml").read_text()
+    (folder / "scenario.yaml").write_text(text.replace("vprnn", "vprnm", 1))
+
+
+def lose_scenario(folder):
+    (folder / "scenario.yaml").unlink()
+
+
 def lose_file(folder):
     (folder / "metrics.json").unlink()
 
@@ -181,13 +194,26 @@ def change(folder, key, value):
     "spoil",
     [
         spoil_json,
+        empty_scenario,
+        change_a_letter,
+        lose_scenario,
         lose_file,
         lose_folder,
         lambda folder: change(folder, "commit", "0" * 40),
         lambda folder: change(folder, "surgsim", "0.0.0"),
         lambda folder: change(folder, "scenario_sha256", "0" * 64),
     ],
-    ids=["half a file", "no file", "no folder", "another commit", "another version", "another scenario"],
+    ids=[
+        "half a file",
+        "empty scenario",
+        "changed scenario",
+        "no scenario",
+        "no file",
+        "no folder",
+        "another commit",
+        "another version",
+        "another scenario",
+    ],
 )
 def test_what_is_not_whole_or_not_of_this_code_is_run_again(copy, whole, spoil):
     folder = copy / read_table(whole)["folder"][2].as_py()
@@ -202,7 +228,7 @@ def test_what_a_killed_run_left_is_neither_counted_nor_kept(copy, whole):
     folder = copy / read_table(whole)["folder"][5].as_py()
     draft = folder.parent / f".{folder.name}.abc.part"
     folder.rename(draft)
-    (copy / ".suite.json.x.part").write_text("half")
+    (copy / ".suite.json.x.partial").write_text("half")
     (copy / ".runs.parquet.x.partial").write_text("half")
     runner = Counting()
     table = compare(batch(copy, resume=True), runner=runner)
@@ -220,9 +246,16 @@ def test_a_recording_that_is_wanted_and_missing_is_made(tmp_path):
     recording = second["recording"][0].as_py()
     assert recording == "runs/circle_lwr4plus/pinv/base-seed0/recording.rrd"
     assert (out / recording).is_file()
+    wanted = batch(out, suite=suite.model_copy(update={"record": True}), resume=True)
     runner = Counting()
-    compare(batch(out, suite=suite.model_copy(update={"record": True}), resume=True), runner=runner)
+    compare(wanted, runner=runner)
     assert runner.folders == []
+    content = (out / recording).read_bytes()
+    for damaged in (b"", content[:-1], content[:-1] + bytes([content[-1] ^ 1])):
+        (out / recording).write_bytes(damaged)
+        runner = Counting()
+        compare(wanted, runner=runner)
+        assert runner.folders == [str((out / recording).parent)]
 
 
 def test_runs_that_cannot_start_are_rows(tmp_path):
@@ -332,7 +365,7 @@ def test_a_full_disk_is_an_error_and_the_rest_can_be_run_later(whole, tmp_path, 
                 raise OSError(errno.ENOSPC, "No space left on device")
             real(source, target)
 
-        patch.setattr("surgsim.runs.folder.os.rename", rename)
+        patch.setattr("surgsim.runs.exchange.os.rename", rename)
         with pytest.raises(DiskError, match="No space left on device"):
             compare(batch(out), runner=here)
     assert len(list(out.glob("runs/*/*/*/metrics.json"))) == 3

@@ -22,7 +22,7 @@ TEXT |= {"scenario_sha256", "surgsim_version", "commit", "machine", "folder", "r
 
 def summary(**changes):
     made = {
-        "schema_version": 1,
+        "schema_version": 2,
         "scenario": "circle",
         "controller": "vprnn",
         "seed": 3,
@@ -134,11 +134,11 @@ def test_numbers_survive_the_csv_bit_for_bit(results, tmp_path):
         ('{"scenario": "circle", "sha256": "00"}', "its sha256 differs"),
         (json.dumps(sealed({"scenario": "circle"})), "'schema_version'"),
         (
-            json.dumps(sealed({"schema_version": 2, "outcome": {"name": "completed"}})),
-            "schema_version 2, but",
+            json.dumps(sealed({"schema_version": 3, "outcome": {"name": "completed"}})),
+            "schema_version 3, but",
         ),
         (
-            json.dumps(sealed({"schema_version": 1, "outcome": {"name": "finished"}})),
+            json.dumps(sealed({"schema_version": 2, "outcome": {"name": "finished"}})),
             "is not a run's outcome",
         ),
         ("[]", "it holds no object"),

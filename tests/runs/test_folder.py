@@ -36,7 +36,7 @@ def test_the_folder_holds_the_run(result, folder, scenario):
     assert _names(folder) == FILES - {"recording.rrd"}
     assert _names(folder.parent) == {"run"}
     summary = json.loads((folder / "metrics.json").read_text())
-    assert summary["schema_version"] == 1
+    assert summary["schema_version"] == 2
     assert (summary["scenario"], summary["controller"], summary["seed"]) == ("circle_lwr4plus", "vprnn", 7)
     assert summary["outcome"]["name"] == "completed"
     assert summary["outcome"]["t_s"] == pytest.approx(0.3)
