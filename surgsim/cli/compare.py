@@ -153,13 +153,15 @@ def _runner(options: argparse.Namespace):  # type: ignore[no-untyped-def]
 def _print(table: Any, options: argparse.Namespace) -> None:
     import json
 
-    from surgsim.cli.output import print_leaderboard
+    from surgsim.cli.output import print_leaderboard, print_paragraphs
     from surgsim.compare.leaderboard import leaderboard
     from surgsim.compare.observations import Observations
+    from surgsim.compare.summary import summary
 
     runs = Observations.of(table)
     rows = leaderboard(runs, options.metric)
     if options.json:
         print(json.dumps(rows, indent=2, default=vars))
     else:
+        print_paragraphs(summary(runs, options.metric, rows).lines)
         print_leaderboard(options.metric, rows, len(set(runs.parameters.tolist())))

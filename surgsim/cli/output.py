@@ -2,6 +2,7 @@
 
 import math
 import sys
+import textwrap
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -53,6 +54,14 @@ def print_table(
         needed = Console(width=_ENOUGH).measure(table).maximum
         console = Console(width=max(console.width, needed), highlight=False)
     console.print(table)
+
+
+def print_paragraphs(lines: Sequence[str]) -> None:
+    """Print lines, broken between words at 80 columns, and an empty one after them."""
+    for line in lines:
+        indent = " " * (len(line) - len(line.lstrip()))
+        print(textwrap.fill(line, 80, subsequent_indent=indent + "  ", break_long_words=False))
+    print()
 
 
 def print_metrics(title: str, metrics: Mapping[str, float | None]) -> None:
@@ -181,13 +190,16 @@ def print_leaderboard(metric: str, rows: "Sequence[LeaderboardRow]", points: int
             return format_number(figure.value)
         return f"{format_number(figure.value)} [{format_number(figure.low)}, {format_number(figure.high)}]"
 
-    def failures(row: "LeaderboardRow") -> str:
-        return ", ".join(f"{count} {name}" for name, count in row.failures.items()) or "none"
+    from surgsim.compare.failures import counted_outcomes
+    from surgsim.metrics.catalog import METRICS
 
-    table = [
-        (row.controller, str(row.runs), failures(row), interval(row.value), interval(row.rank))
-        for row in rows
-    ]
-    header = ("controller", "runs", "failed", f"{metric} (IQM, 95 %)", "mean rank (95 %)")
+    def cells(row: "LeaderboardRow") -> tuple[str, ...]:
+        place, failed = str(row.place or "-"), counted_outcomes(row.failures) or "none"
+        rank = format_number(row.rank.value, 3)
+        return (place, row.controller, failed, str(row.runs), interval(row.value), rank)
+
+    table = [cells(row) for row in rows]
+    header = ("place", "controller", "failed", "runs", "IQM [95 %]", "mean rank")
     pooled = f", all {points} points of the grid pooled" if points > 1 else ""
-    print_table(f"{metric}, best mean rank first{pooled}", header, table, right=(1, 3, 4))
+    title = f"{METRICS[metric].heading}; who is not told apart shares a place{pooled}"
+    print_table(title, header, table, right=(0, 3, 4, 5))

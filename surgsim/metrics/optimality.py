@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surgsim.control.self_motion import SelfMotion, SelfMotionPoint
-from surgsim.metrics.metric import Metric
+from surgsim.metrics.metric import CHOICE, Metric
 from surgsim.models.arm import ArmModel
 from surgsim.models.config import SceneConfig
 from surgsim.trace.trace import Trace
@@ -105,6 +105,9 @@ def _manifold_of(scene: str) -> SelfMotion:
 METRICS = (
     Metric(
         name="manipulability_optimality",
+        heading="manipulability over the attainable, mean",
+        matters=0.01,
+        matters_source=CHOICE,
         meaning="mean of the manipulability over the largest that self-motion could reach",
         compute=manipulability_optimality,
         lower_is_better=False,

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from surgsim.metrics.metric import Metric
+from surgsim.metrics.metric import CHOICE, Metric
 from surgsim.trace.trace import Trace
 
 
@@ -27,16 +27,25 @@ def deadline_miss_fraction(trace: Trace) -> float:
 METRICS = (
     Metric(
         name="control_time_p50_us",
+        heading="time of a control tick, median [µs]",
+        matters=10.0,
+        matters_source=CHOICE,
         meaning="median processor time of the controller per tick",
         compute=lambda trace: control_time_percentile_us(trace, 50.0),
     ),
     Metric(
         name="control_time_p99_us",
+        heading="time of a control tick, 99th percentile [µs]",
+        matters=10.0,
+        matters_source=CHOICE,
         meaning="99th percentile of the controller's processor time per tick",
         compute=lambda trace: control_time_percentile_us(trace, 99.0),
     ),
     Metric(
         name="deadline_miss_fraction",
+        heading="ticks later than their period, share",
+        matters=0.01,
+        matters_source=CHOICE,
         meaning="fraction of ticks in which that was longer than the control period",
         compute=deadline_miss_fraction,
     ),

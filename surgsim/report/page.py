@@ -4,11 +4,12 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from surgsim import __version__
+from surgsim.compare.summary import summary
 from surgsim.report import html
 from surgsim.report.axes import axes_of, sweeps_of
 from surgsim.report.results import Results
 from surgsim.report.sections.gain_maps import maps_section
-from surgsim.report.sections.leaderboard import boards_of, failures_section, leaderboard_section
+from surgsim.report.sections.leaderboard import Boards, boards_of, failures_section, leaderboard_section
 from surgsim.report.sections.methods import methods_section, versions_section
 from surgsim.report.sections.pairs import pairs_section
 from surgsim.report.sections.ranking import ranking_section
@@ -52,7 +53,7 @@ def page(results: Results, series: Mapping[str, Series], file: Path) -> str:
 <style>{style}</style>
 </head>
 <body>
-{_header(results)}
+{_header(results, boards)}
 {_navigation(results)}
 <main>
 {chr(10).join(part for part in parts if part)}
@@ -67,7 +68,7 @@ def _name(results: Results) -> str:
     return str(results.suite.get("name") or results.folder.resolve().name)
 
 
-def _header(results: Results) -> str:
+def _header(results: Results, boards: Boards) -> str:
     runs = results.runs
     failed = len(runs) - int(runs.completed.sum())
     facts = (
@@ -82,7 +83,22 @@ def _header(results: Results) -> str:
     items = "".join(f'<li class="{kind}"><b>{count}</b>{name}</li>' for name, count, kind in facts)
     about = html.paragraph(str(results.suite.get("description") or ""))
     title = f"<h1>{html.escape(_name(results))}</h1>"
-    return f'<header><div>{title}{about}<ul class="facts">{items}</ul></div></header>'
+    return (
+        f'<header><div>{title}{about}{_result(results, boards)}<ul class="facts">{items}</ul></div></header>'
+    )
+
+
+def _result(results: Results, boards: Boards) -> str:
+    """Who wins, by how much, how sure, and where each fails."""
+    if not boards:
+        return ""
+    metric = results.headline[0]
+    told = summary(results.runs, metric, list(boards[metric].values()))
+    rows = "".join(
+        f'<li class="{"bad" if one.bad else ""}">{html.escape(one.sentence)}.</li>' for one in told.failing
+    )
+    fails = f'<h2>Where each fails</h2><ul class="failing">{rows}</ul>'
+    return html.paragraph(told.first, "lead") + html.paragraph(told.least) + fails
 
 
 def _navigation(results: Results) -> str:

@@ -9,7 +9,7 @@ from surgsim.compare.observations import Observations
 from surgsim.report import html
 from surgsim.report.axes import Axis, axes_of
 from surgsim.report.figures.heat import HeatMap, heat_map, shades_of
-from surgsim.report.figures.svg import tick_text
+from surgsim.report.figures.ticks import tick_text
 from surgsim.report.results import Results, parameters_of
 from surgsim.report.sections.leaderboard import metric_label
 

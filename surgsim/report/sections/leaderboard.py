@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 
 from surgsim.compare.intervals import Interval
 from surgsim.compare.leaderboard import LeaderboardRow, leaderboard
-from surgsim.compare.wording import bracket, counted, number, unit_of
+from surgsim.compare.wording import bracket, counted, number
 from surgsim.metrics.catalog import METRICS
 from surgsim.report import html
 from surgsim.report.results import Results
@@ -16,7 +16,10 @@ Boards = Mapping[str, Mapping[str, LeaderboardRow]]
 def boards_of(results: Results) -> dict[str, dict[str, LeaderboardRow]]:
     """Leaderboards of all metrics."""
     return {
-        name: {row.controller: row for row in leaderboard(results.runs, name)} for name in results.metrics
+        name: {
+            row.controller: row for row in leaderboard(results.runs, name, places=name == results.headline[0])
+        }
+        for name in results.metrics
     }
 
 
@@ -138,10 +141,8 @@ def _best(metric: str, rows: Mapping[str, LeaderboardRow]) -> str | None:
 
 
 def metric_label(name: str) -> str:
-    """Name of a metric with its unit, for an axis."""
-    unit = unit_of(name)
-    stem = name.removesuffix("_mm_per_s").removesuffix(f"_{name.rsplit('_', 1)[-1]}") if unit else name
-    return f"{stem.replace('_', ' ')} [{unit}]" if unit else name.replace("_", " ")
+    """Heading of a metric: words and unit."""
+    return METRICS[name].heading
 
 
 def failures_section(results: Results) -> str:

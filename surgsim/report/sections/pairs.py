@@ -1,8 +1,10 @@
 """Every controller against every other, in words."""
 
 from surgsim.compare.intervals import Interval
-from surgsim.compare.statistics import Comparison, Verdict, compare_all
-from surgsim.compare.wording import bracket, counted, number, unit_of
+from surgsim.compare.statistics import Comparison, compare_all
+from surgsim.compare.verdict import Verdict
+from surgsim.compare.wording import bracket, counted, number, seeds_of
+from surgsim.metrics.catalog import METRICS
 from surgsim.report import html
 from surgsim.report.results import Results
 
@@ -29,16 +31,13 @@ def pairs_section(results: Results) -> str:
 def comparison_table(results: Results, metric: str, scenario: str | None = None) -> str:
     """Comparisons by one metric; of many controllers only the first ones."""
     found = compare_all(results.runs, metric, scenario, most=_MOST_CONTROLLERS)
-    head = ["A against B", "finding", f"A − B{_unit(metric)}", "P(A better)", "pairs", "left out"]
+    unit = METRICS[metric].heading.partition(" [")[2]
+    unit = f" [{unit}" if unit else ""
+    head = ["A against B", "finding", f"A − B{unit}", "P(A better)", "pairs", "left out"]
     cut = len(results.runs.controllers) > _MOST_CONTROLLERS
     note = f"The first {_MOST_CONTROLLERS} controllers only." if cut else ""
     table = html.table(f"Pairs by {metric}", head, [_row(comparison) for comparison in found], "pairs")
     return table + (html.paragraph(note) if note else "")
-
-
-def _unit(metric: str) -> str:
-    unit = unit_of(metric)
-    return f" [{unit}]" if unit else ""
 
 
 def _row(found: Comparison) -> list[str]:
@@ -49,7 +48,7 @@ def _row(found: Comparison) -> list[str]:
         f'<td class="{kind}">{html.escape(found.sentence)}</td>',
         _figure(found.difference),
         _figure(found.improvement),
-        f"{found.pairs}<small>{found.difference.n} seeds</small>",
+        f"{found.pairs}<small>{html.escape(seeds_of(found.seeds))}</small>",
         f"{sum(found.left_out.values())}<small>{html.escape(left)}</small>" if left else "0",
     ]
 

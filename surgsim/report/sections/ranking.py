@@ -9,8 +9,7 @@ from surgsim.report.figures.intervals import interval_plot
 from surgsim.report.results import Results
 from surgsim.report.sections.leaderboard import Boards
 
-_TAUS = 60
-_FURTHEST = 1e4
+_TAUS = 80
 
 
 def ranking_section(results: Results, boards: Boards) -> str:
@@ -50,8 +49,8 @@ def _profile(results: Results, metric: str) -> str:
     score = scores(runs, metric)
     finite = score[np.isfinite(score) & (score > 0.0)]
     low = min(float(finite.min()), 1.0) if finite.size else 1.0
-    high = min(max(float(finite.max()), 2.0), _FURTHEST) if finite.size else 2.0
-    taus = np.geomspace(low, high * 1.05, _TAUS)
+    high = max(float(finite.max()), 2.0) if finite.size else 2.0
+    taus = np.geomspace(low, high * 1.05, _TAUS)  # to the worst score: who completed all reaches the top
     curves = []
     for index, name in enumerate(runs.controllers):
         mine = np.asarray(runs.controller == name, dtype=bool)

@@ -4,12 +4,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from surgsim.compare.failures import WORST_RCM_MM
 from surgsim.compare.observations import Observations
 from surgsim.report import html
 from surgsim.report.axes import Axis, sweeps_of
-from surgsim.report.failing import WORST_RCM_MM, AtLevel, along, at_level
+from surgsim.report.failing import AtLevel, along, at_level
 from surgsim.report.figures.levels import LevelTrack, levels_plot
-from surgsim.report.figures.svg import tick_text
+from surgsim.report.figures.ticks import tick_text
 from surgsim.report.results import Results
 from surgsim.report.sections.leaderboard import metric_label
 
