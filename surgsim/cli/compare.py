@@ -46,6 +46,7 @@ def execute(options: argparse.Namespace) -> int:
     from surgsim.cli.output import show_batch_progress
     from surgsim.compare.engine import Batch, compare
     from surgsim.report.write import write_report
+    from surgsim.runs.stop import Stopped
 
     _check(options)
     suite, folder = _suite(options)
@@ -62,9 +63,9 @@ def execute(options: argparse.Namespace) -> int:
     try:
         with redirect_stdout(sys.stderr), show_batch_progress(suite.name) as report:  # ray prints warnings
             table = compare(batch, report, _runner(options))
-    except KeyboardInterrupt:
-        print(f"surgsim: interrupted; --resume --out {out} runs what is missing", file=sys.stderr)
-        return 130
+    except Stopped as stopped:
+        print(f"surgsim: {stopped.told}; --resume --out {out} runs what is missing", file=sys.stderr)
+        return stopped.exit_status
     if table is None:
         print(f"{out}: other shards' runs are missing; --resume makes the table once they are there")
         return 1

@@ -1,7 +1,7 @@
 """Entry point: parses the command line and runs one command.
 
 Exit status: 0 done; 1 the run ended with an outcome other than completed, or figures differ; 2 the user's
-input is wrong.
+input is wrong; 128 and the signal's number if one ended the command (Ctrl-C 130, SIGTERM 143).
 """
 
 import argparse
@@ -12,6 +12,7 @@ from collections.abc import Sequence
 
 from surgsim import __version__
 from surgsim.errors import SurgsimError
+from surgsim.runs.stop import Stopped, stopping_in_order
 
 COMMANDS = ("run", "check", "list", "compare", "report", "inspect", "reproduce", "bench")
 _LONGEST_ERROR = 1000
@@ -59,14 +60,15 @@ def print_error(error: SurgsimError) -> None:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command and return its exit status."""
     try:
-        options = build_parser().parse_args(arguments)
-        return int(options.execute(options))
+        with stopping_in_order():
+            options = build_parser().parse_args(arguments)
+            return int(options.execute(options))
     except SurgsimError as error:
         print_error(error)
         return 2
-    except KeyboardInterrupt:
-        print("surgsim: interrupted, nothing was written", file=sys.stderr)
-        return 130
+    except Stopped as stopped:
+        print(f"surgsim: {stopped.told}; nothing half done is left", file=sys.stderr)
+        return stopped.exit_status
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0

@@ -144,17 +144,18 @@ def _batch_bar(label: str) -> Iterator[Callable[[int, int, str], None]]:
     columns = (
         TextColumn("{task.description}"),
         BarColumn(),
-        TextColumn("{task.completed:.0f}/{task.total:.0f} runs  {task.fields[failed]}"),
+        TextColumn("{task.completed:.0f}/{task.fields[runs]} runs  {task.fields[failed]}"),
         TimeRemainingColumn(),
     )
     failed = 0
     with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task(label, total=None, failed="")
+        task = bar.add_task(label, total=None, runs="?", failed="")
 
         def update(done: int, total: int, outcome: str) -> None:
             nonlocal failed
             failed += outcome != "completed"
-            bar.update(task, completed=done, total=total, failed=f"{failed} failed" if failed else "")
+            shown = f"{failed} failed" if failed else ""
+            bar.update(task, completed=done, total=total, runs=total, failed=shown)
 
         yield update
 

@@ -3,10 +3,8 @@
 import json
 import os
 import re
-import signal
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import pytest
@@ -62,7 +60,7 @@ def test_it_ends_with_a_leaderboard(done, folder):
     assert done.returncode == 0, done.stderr
     assert "pinv" in done.stdout
     assert "vprnn" in done.stdout
-    assert "rcm_error_rms_mm" in done.stdout
+    assert "RCM error, RMS" in done.stdout
     out = folder / "runs" / "suites" / "tiny"
     assert sorted(path.name for path in out.iterdir()) == [
         "report.html",
@@ -111,36 +109,6 @@ def test_shards_from_the_command_line(capsys, monkeypatch, folder, done):
     columns = ["run_id", "outcome", "tip_error_rms_mm", "rcm_error_max_mm"]
     whole = read_table(folder / "runs" / "suites" / "tiny").select(columns)
     assert read_table(folder / "shards").select(columns).equals(whole)
-
-
-def test_ctrl_c_ends_the_workers_and_says_how_to_go_on(folder):
-    command = [sys.executable, "-m", "surgsim", "compare", "tiny.yaml", "--out", "broken", "--seeds", "0:50"]
-    with subprocess.Popen(
-        command, cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-    ) as process:
-        end = time.monotonic() + 100.0
-        while not list((folder / "broken").glob("runs/*/*/*/metrics.json")):
-            assert time.monotonic() < end, "no run was done"
-            time.sleep(0.02)
-        children = Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()
-        process.send_signal(signal.SIGINT)
-        out, error = process.communicate(timeout=60)
-    assert process.returncode == 130
-    assert out == ""
-    assert error.splitlines()[-1] == "surgsim: interrupted; --resume --out broken runs what is missing"
-    assert "Traceback" not in error
-    assert children
-    end = time.monotonic() + 30.0
-    while any(alive(pid) for pid in children):
-        assert time.monotonic() < end, "workers are left"
-        time.sleep(0.02)
-
-
-def alive(pid):
-    try:
-        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
-    except OSError:
-        return False
 
 
 WRONG = {
