@@ -33,6 +33,7 @@ from surgsim.scenario.schema import (
     StartConfig,
     StopConfig,
 )
+from surgsim.scenario.thresholds import Threshold, ThresholdsConfig
 from surgsim.scenario.yaml_text import parse_yaml
 from surgsim.simulate.loop import simulate
 from surgsim.simulate.setup import prepare
@@ -133,6 +134,8 @@ def sections():
         "simulation": SimulationConfig,
         "safety": SafetyConfig,
         "safety: stop": StopConfig,
+        "thresholds": ThresholdsConfig,
+        "thresholds: threshold": Threshold,
         "recording": RecordingConfig,
         "controller": ControllerConfig,
     }

@@ -31,6 +31,7 @@ LAYERS = (
     "surgsim.trace",
     "surgsim.simulate",
     "surgsim.metrics",
+    "surgsim.verdict",
     "surgsim.recording",
     "surgsim.runs",
     "surgsim.live",

@@ -140,12 +140,15 @@ def _one(path: Path, options: argparse.Namespace) -> int:
 
 def _print(trace: "Trace", metrics: Mapping[str, float | None], found: list[str], as_json: bool) -> None:
     if as_json:
+        from surgsim.verdict import judge
+
         scenario = trace.meta.scenario
         whole = {
             "scenario": scenario["name"],
             "controller": scenario["controller"]["name"],
             "seed": scenario["seed"],
             "outcome": trace.meta.ending.to_dict(),
+            **judge(trace, metrics).to_dict(),
             "metrics": dict(metrics),
             "differences": found,
         }

@@ -79,11 +79,14 @@ def print_metrics(title: str, metrics: Mapping[str, float | None]) -> None:
 
 
 def print_run(trace: "Trace", metrics: Mapping[str, float | None]) -> None:
-    """Print a run's metrics, and how it ended."""
+    """Print a run's metrics, whether its task was done, and how it ended."""
+    from surgsim.verdict import judge
+
     scenario, ending = trace.meta.scenario, trace.meta.ending
     print_metrics(f"{scenario['name']}, {scenario['controller']['name']}, seed {scenario['seed']}", metrics)
     detail = f" {ending.detail}." if ending.detail else ""
-    print(f"\n{ending.outcome.name.lower()} at {ending.t_s:.3f} s: {ending.outcome.value}{detail}")
+    print(f"\n{judge(trace, metrics).line()}")
+    print(f"{ending.outcome.name.lower()} at {ending.t_s:.3f} s: {ending.outcome.value}{detail}")
 
 
 @contextmanager
@@ -195,7 +198,9 @@ def print_leaderboard(metric: str, rows: "Sequence[LeaderboardRow]", points: int
     from surgsim.metrics.catalog import METRICS
 
     def cells(row: "LeaderboardRow") -> tuple[str, ...]:
-        place, failed = str(row.place or "-"), counted_outcomes(row.failures) or "none"
+        undone = f"{row.not_done} not done" if row.not_done else ""
+        failed = ", ".join(filter(None, (counted_outcomes(row.failures), undone))) or "none"
+        place = str(row.place or "-")
         rank = format_number(row.rank.value, 3)
         return (place, row.controller, failed, str(row.runs), interval(row.value), rank)
 

@@ -8,6 +8,7 @@ from typing import Any
 from surgsim.errors import Outcome, SurgsimError
 from surgsim.runs.folder import execute, summary_of, whole_folder, write_run, write_summary
 from surgsim.scenario.schema import Scenario
+from surgsim.verdict import unfinished
 
 REFUSED = "refused"
 WORKER_DIED = "worker_died"
@@ -83,7 +84,7 @@ def write_failure(scenario: Scenario, folder: Path, name: str, detail: str) -> N
     outcome = {"name": name, "sentence": _SENTENCES[name], "t_s": 0.0, "detail": detail, "data": {}}
     try:
         with whole_folder(folder) as draft:
-            write_summary(draft, scenario, summary_of(scenario, outcome, {}, 0.0))
+            write_summary(draft, scenario, summary_of(scenario, outcome, unfinished(name), {}, 0.0))
     except SurgsimError as error:
         raise DiskError(str(error)) from error
 

@@ -50,6 +50,8 @@ def schema() -> pa.Schema:
     fields += [pa.field("seed", pa.int64()), pa.field("parameters", pa.string())]
     fields += [pa.field("outcome", pa.string()), pa.field("outcome_t_s", pa.float64())]
     fields += [pa.field("outcome_detail", pa.string())]
+    fields += [pa.field("success", pa.bool_()), pa.field("success_reason", pa.string())]
+    fields += [pa.field("exceeded", pa.string())]
     fields += [pa.field(name, pa.float64()) for name in METRICS]
     fields += [pa.field("wall_time_s", pa.float64())]
     texts = ("scenario_sha256", "surgsim_version", "commit", "machine", "folder", "recording")
@@ -78,6 +80,9 @@ def read_row(root: Path, row: Row) -> dict[str, Any]:
             "outcome": outcome["name"],
             "outcome_t_s": outcome["t_s"],
             "outcome_detail": outcome["detail"],
+            "success": summary["success"],
+            "success_reason": summary["success_reason"],
+            "exceeded": ",".join(held["metric"] for held in summary["thresholds"] if held["exceeded"]),
             **{name: summary["metrics"].get(name) for name in METRICS},
             "wall_time_s": provenance["wall_time_s"],
             "scenario_sha256": provenance["scenario_sha256"],

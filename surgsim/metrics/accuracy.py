@@ -45,6 +45,14 @@ METRICS = (
         compute=lambda trace: 1e3 * float(np.max(trace["tip_error_m"])),
     ),
     Metric(
+        name="tip_error_end_mm",
+        heading="tip error at the end [mm]",
+        matters=0.1,
+        matters_source=REPEATABILITY,
+        meaning="distance of the tip from its command at the end",
+        compute=lambda trace: 1e3 * float(trace["tip_error_m"][-1]),
+    ),
+    Metric(
         name="rcm_error_rms_mm",
         heading="RCM error, RMS [mm]",
         matters=0.1,

@@ -5,6 +5,7 @@ import os
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from functools import cached_property
 from hashlib import sha256
 from pathlib import Path
 from time import perf_counter
@@ -22,6 +23,7 @@ from surgsim.scenario.schema import Scenario
 from surgsim.scenario.yaml_text import dump_yaml
 from surgsim.simulate.loop import Progress, simulate
 from surgsim.trace.trace import Trace
+from surgsim.verdict import Verdict, judge
 
 SCHEMA_VERSION = 2
 RUN_FILES = frozenset({"scenario.yaml", "metrics.json", "recording.rrd"})
@@ -42,6 +44,11 @@ class RunResult:
     metrics: Mapping[str, float | None]
     wall_time_s: float
     undefined: Mapping[str, str] = field(default_factory=dict)
+
+    @cached_property
+    def verdict(self) -> Verdict:
+        """Whether its task was done, and the thresholds that it is held against."""
+        return judge(self.trace, self.metrics)
 
     @property
     def real_time_factor(self) -> float:
@@ -92,7 +99,9 @@ def write_run(
     """
     with whole_folder(folder) as draft:
         outcome = result.trace.meta.ending.to_dict()
-        summary = summary_of(scenario, outcome, result.metrics, result.wall_time_s, result.undefined)
+        summary = summary_of(
+            scenario, outcome, result.verdict, result.metrics, result.wall_time_s, result.undefined
+        )
         if operator_input is not None:
             summary["provenance"]["operator_input_sha256"] = sha256(operator_input.encode()).hexdigest()
             write_file(draft / "operator_input.csv", operator_input)
@@ -148,6 +157,7 @@ def whole_folder(folder: Path) -> Iterator[Path]:
 def summary_of(
     scenario: Scenario,
     outcome: Mapping[str, Any],
+    verdict: Verdict,
     metrics: Mapping[str, float | None],
     wall_s: float,
     undefined: Mapping[str, str] | None = None,
@@ -159,6 +169,7 @@ def summary_of(
         "controller": scenario.controller.name,
         "seed": scenario.seed,
         "outcome": dict(outcome),
+        **verdict.to_dict(),
         "metrics": dict(metrics),
         "undefined": dict(undefined or {}),
         "provenance": {**provenance(), "scenario_sha256": scenario.sha256(), "wall_time_s": round(wall_s, 6)},

@@ -15,6 +15,7 @@ from surgsim.plant.disturbances import DISTURBANCES
 from surgsim.plant.dynamic import DynamicPlantConfig
 from surgsim.plant.part import PlantPart
 from surgsim.plant.props import PROPS
+from surgsim.scenario.thresholds import ThresholdsConfig
 from surgsim.tasks import TASKS
 
 AnyTask: Any = TASKS.union()
@@ -127,6 +128,7 @@ class Scenario(PartConfig):
     props: tuple[AnyProp, ...] = ()
     simulation: SimulationConfig = SimulationConfig()
     safety: SafetyConfig = SafetyConfig()
+    thresholds: ThresholdsConfig = ThresholdsConfig()
     recording: RecordingConfig = RecordingConfig()
 
     @model_validator(mode="after")

@@ -13,6 +13,7 @@ from surgsim.columns import Block
 from surgsim.models.config import Vec3
 from surgsim.spatial import plane_axes
 from surgsim.tasks.profile import Profile
+from surgsim.tasks.success import RunColumns, Success, path_success
 
 Array = NDArray[np.float64]
 _REACH_SAMPLES = 200
@@ -195,6 +196,10 @@ class PathTaskConfig(PartConfig, ABC):
         )
         axes = plane_axes(np.array(self.normal), np.array(self.direction))
         return PathTask(shape=self, profile=profile, start=np.array(start), R_WP=np.column_stack(axes))
+
+    def success(self, run: RunColumns) -> Success:
+        """Whether the path was followed."""
+        return path_success(run)
 
 
 class PathTask(TimedTask):

@@ -98,6 +98,7 @@ def make_results(root: Path, names: dict[str, Any] = PLAIN, seeds: int = 10) -> 
                             seed=seed,
                             parameters=json.dumps({KEY: mass}),
                             outcome=outcome,
+                            success=outcome == "completed",
                             outcome_detail="" if outcome == "completed" else "<i>5.1</i> mm & more",
                             folder=folder,
                             recording=f"{folder}/recording.rrd" if seed == 0 else None,
@@ -164,5 +165,15 @@ def runs_of() -> Callable[..., Observations]:
                     row_of(scenario=scenario, controller=controller, seed=seed, outcome=outcome, **found)
                 )
         return replace(observations(rows), smallest={metric: matters})
+
+    return make
+
+
+@pytest.fixture
+def rows_of_table() -> Callable[..., Observations]:
+    """Factory of observations from rows of the table, completed, with the given values."""
+
+    def make(given: list[dict[str, Any]]) -> Observations:
+        return observations([row_of(**row, folder=f"runs/{i}") for i, row in enumerate(given)])
 
     return make
