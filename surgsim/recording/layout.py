@@ -20,6 +20,7 @@ COLUMNS = "columns"
 SERIES = "signals"
 LIMITS = "signal_limits"  # sorts after `signals`: legends name the joints first
 ERRORS = "errors_mm"
+KEY = "joint_key"
 SCENE = "scene"
 SUMMARY = "summary"
 LOG = "log"

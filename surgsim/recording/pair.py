@@ -7,8 +7,10 @@ from typing import Any
 import rerun as rr
 import rerun.blueprint as rrb
 
-from surgsim.recording.blueprint import plot, scene_view, texts_view
-from surgsim.recording.layout import ERRORS, LIMITS, TIMELINE, series_path
+from surgsim.recording.blueprint import laid_out, texts_view
+from surgsim.recording.eyes import inside_view, scene_view
+from surgsim.recording.layout import series_path
+from surgsim.recording.plots import errors_plot, joint_key, joint_plots, plot
 from surgsim.recording.read import Recorded
 from surgsim.recording.scene import log_scene, scenario_of
 from surgsim.recording.signals import log_signals
@@ -62,25 +64,24 @@ class _Below:
 
 
 def _blueprint(traces: Sequence[Trace]) -> rrb.Blueprint:
-    columns = [_column(side, trace) for side, trace in zip(_SIDES, traces, strict=True)]
-    return rrb.Blueprint(
-        rrb.Horizontal(*columns),
-        rrb.BlueprintPanel(state="collapsed"),
-        rrb.SelectionPanel(state="collapsed"),
-        rrb.TimePanel(state="collapsed", timeline=TIMELINE),
-        auto_views=False,
-    )
+    columns = [_column(f"{side}/", trace) for side, trace in zip(_SIDES, traces, strict=True)]
+    return laid_out(rrb.Horizontal(*columns))
 
 
-def _column(side: str, trace: Trace) -> rrb.Vertical:
+def _column(below: str, trace: Trace) -> rrb.Vertical:
     """Scene, errors, manipulability, torques and texts of one run."""
+    scenario = scenario_of(trace)
     return rrb.Vertical(
-        scene_view(scenario_of(trace), trace, below=f"{side}/", name=title(trace)),
         rrb.Horizontal(
-            plot("Tip and RCM error [mm]", f"{side}/{ERRORS}"),
-            plot("Manipulability", f"{side}/{series_path('manipulability')}"),
-            plot("Torque [N m]", f"{side}/{series_path('tau')}", f"{side}/{LIMITS}/tau"),
+            scene_view(scenario, trace, below=below, name=title(trace)),
+            inside_view(scenario, trace, below=below),
         ),
-        texts_view(f"{side}/"),
-        row_shares=[0.5, 0.3, 0.2],
+        rrb.Horizontal(
+            errors_plot(below),
+            plot("Manipulability", f"{below}{series_path('manipulability')}"),
+            joint_plots(trace, below)[-1],
+        ),
+        joint_key(below),
+        texts_view(below),
+        row_shares=[0.45, 0.3, 0.06, 0.19],
     )
