@@ -13,7 +13,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from surgsim.cli.output import print_table
+from surgsim.cli.table import print_table
 from surgsim.scenario.load import load_scenario, shipped
 from surgsim.scenario.schema import Scenario
 from surgsim.simulate.loop import simulate

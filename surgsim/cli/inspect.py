@@ -186,7 +186,8 @@ def _two(paths: list[Path], options: argparse.Namespace) -> int:
 
 
 def _print_difference(pair: "list[Recorded]", as_json: bool) -> None:
-    from surgsim.cli.output import format_number, print_table
+    from surgsim.cli.output import format_number
+    from surgsim.cli.table import print_table
     from surgsim.metrics.catalog import METRICS, compute_metrics
 
     a, b = (compute_metrics(recorded.trace) for recorded in pair)
@@ -214,7 +215,8 @@ def _largest_gap_mm(a: "Trace", b: "Trace") -> float | None:
 
 
 def _list_batch(path: Path, options: argparse.Namespace) -> int:
-    from surgsim.cli.output import format_number, print_table
+    from surgsim.cli.output import format_number
+    from surgsim.cli.table import print_table
     from surgsim.compare.table import read_table
 
     rows = read_table(path).to_pylist()

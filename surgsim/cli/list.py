@@ -32,7 +32,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def execute(options: argparse.Namespace) -> int:
     """Print the names with a line about each."""
-    from surgsim.cli.output import print_table
+    from surgsim.cli.table import print_table
 
     items = _items(options.kind)
     if options.json:

@@ -2,7 +2,6 @@
 
 import math
 import sys
-import textwrap
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -10,8 +9,8 @@ from typing import TYPE_CHECKING
 
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
-from rich.table import Table
 
+from surgsim.cli.table import fit_prose, print_prose, print_table, terminal_width
 from surgsim.simulate.loop import Progress as ProgressCall
 
 if TYPE_CHECKING:
@@ -31,36 +30,14 @@ def format_number(value: float | None, digits: int = 4) -> str:
     return f"{value:.{digits - 1}e}"
 
 
-_ENOUGH = 10_000  # columns
-
-
-def print_table(
-    title: str,
-    header: Sequence[str],
-    rows: Sequence[Sequence[str]],
-    right: Sequence[int] = (),
-    *,
-    whole: bool = False,
-) -> None:
-    """Print a table, the columns in `right` right-aligned; a `whole` one may be wider than the terminal."""
-    table = Table(title=title, title_justify="left", box=None, pad_edge=False, header_style="bold")
-    for index, name in enumerate(header):
-        table.add_column(name, justify="right" if index in right else "left", no_wrap=whole or index in right)
-    for row in rows:
-        table.add_row(*row)
-    width = None if sys.stdout.isatty() else 110
-    console = Console(width=width, highlight=False)
-    if whole:
-        needed = Console(width=_ENOUGH).measure(table).maximum
-        console = Console(width=max(console.width, needed), highlight=False)
-    console.print(table)
-
-
 def print_paragraphs(lines: Sequence[str]) -> None:
-    """Print lines, broken between words at 80 columns, and an empty one after them."""
+    """Print lines, broken between words, and an empty one after them; what goes on is indented further."""
+    width = min(80, terminal_width(sys.stdout))
     for line in lines:
-        indent = " " * (len(line) - len(line.lstrip()))
-        print(textwrap.fill(line, 80, subsequent_indent=indent + "  ", break_long_words=False))
+        text = line.lstrip()
+        indent = " " * (len(line) - len(text))
+        first, *others = fit_prose(text, width - len(indent) - 2)
+        print("\n".join([indent + first, *(f"{indent}  {other}" for other in others)]))
     print()
 
 
@@ -85,8 +62,9 @@ def print_run(trace: "Trace", metrics: Mapping[str, float | None]) -> None:
     scenario, ending = trace.meta.scenario, trace.meta.ending
     print_metrics(f"{scenario['name']}, {scenario['controller']['name']}, seed {scenario['seed']}", metrics)
     detail = f" {ending.detail}." if ending.detail else ""
-    print(f"\n{judge(trace, metrics).line()}")
-    print(f"{ending.outcome.name.lower()} at {ending.t_s:.3f} s: {ending.outcome.value}{detail}")
+    print()
+    print_prose(judge(trace, metrics).line())
+    print_prose(f"{ending.outcome.name.lower()} at {ending.t_s:.3f} s: {ending.outcome.value}{detail}")
 
 
 @contextmanager

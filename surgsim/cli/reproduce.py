@@ -84,7 +84,7 @@ def _print_json(study: str, result: "StudyResult") -> None:
 
 
 def _print(study: str, result: "StudyResult") -> None:
-    from surgsim.cli.output import print_table
+    from surgsim.cli.table import print_table
     from surgsim.studies.study import format_cell
 
     name, rows = next(iter(result.tables.items()))
