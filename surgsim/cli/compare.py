@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from surgsim.cli.paths import path_argument
+from surgsim.cli.scenario_options import add_settings
 
 MOST_SHARDS = 10_000
 HELP = "run a suite of scenarios and controllers, and compare them"
@@ -19,9 +20,10 @@ missing.
 
 examples:
   surgsim compare quick
-  surgsim compare circle_lwr4plus spiral_lwr4plus --controllers vprnn,rcm_inverse_dynamics --seeds 0:5
+  surgsim compare circle_lwr4plus spiral_lwr4plus --controllers vprnn,qp --seeds 0:5
+  surgsim compare quick --set task.radius_m=0.01 --out runs/small
   surgsim compare quick --out results/quick --jobs 2 --resume
-  surgsim compare full --out /shared/full --shard 3/8        one of eight array jobs; then --resume once
+  surgsim compare full --out /shared/full --shard 3/8   one of eight array jobs
 """
 
 
@@ -30,6 +32,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("names", nargs="+", metavar="SUITE|SCENARIO", help="one suite, or scenarios")
     parser.add_argument("--controllers", metavar="A,B", help="controllers instead of the suite's")
     parser.add_argument("--seeds", metavar="0:10", help="seeds instead of the suite's: 0:10, 3 or 1,4,9")
+    add_settings(parser, "change one value in every run; may be given again")
     parser.add_argument("--jobs", type=int, metavar="N", help="worker processes; default: the cores")
     parser.add_argument("--engine", choices=("local", "ray"), default="local", help="where runs are done")
     parser.add_argument("--address", metavar="HOST:PORT", help="the ray cluster's address")
@@ -44,6 +47,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def execute(options: argparse.Namespace) -> int:
     """Run the suite; 0 when its table is whole, 1 while other shards are missing or if a run crashed."""
     from surgsim.cli.output import show_batch_progress
+    from surgsim.cli.table import print_prose
     from surgsim.compare.engine import Batch, compare
     from surgsim.report.write import write_report
     from surgsim.runs.stop import Stopped
@@ -63,20 +67,23 @@ def execute(options: argparse.Namespace) -> int:
     try:
         with redirect_stdout(sys.stderr), show_batch_progress(suite.name) as report:  # ray prints warnings
             table = compare(batch, report, _runner(options))
+        if table is None:
+            print_prose(
+                f"{out}: other shards' runs are missing; --resume makes the table once they are there"
+            )
+            return 1
+        _print(table, options)
+        print_prose(f"{table.num_rows} runs; wrote {out / 'runs.parquet'} and runs.csv", sys.stderr)
+        print_prose(f"wrote {write_report(out)}", sys.stderr)
     except Stopped as stopped:
-        print(f"surgsim: {stopped.told}; --resume --out {out} runs what is missing", file=sys.stderr)
+        print_prose(f"surgsim: {stopped.told}; --resume --out {out} runs what is missing", sys.stderr)
         return stopped.exit_status
-    if table is None:
-        print(f"{out}: other shards' runs are missing; --resume makes the table once they are there")
-        return 1
-    _print(table, options)
-    print(f"{table.num_rows} runs; wrote {out / 'runs.parquet'} and runs.csv", file=sys.stderr)
-    print(f"wrote {write_report(out)}", file=sys.stderr)
     return _tell_broken(table)
 
 
 def _tell_broken(table: Any) -> int:
     """Say which runs broke surgsim itself; 1 if there are any, else 0."""
+    from surgsim.cli.table import print_prose
     from surgsim.compare.job import broken
 
     runs = broken(table)
@@ -84,7 +91,7 @@ def _tell_broken(table: Any) -> int:
         return 0
     named = ", ".join(runs[:3]) + (f" and {len(runs) - 3} more" if len(runs) > 3 else "")
     text = f"{len(runs)} of {table.num_rows} runs crashed or lost their worker: {named}"
-    print(f"surgsim: {text}; outcome_detail in runs.csv says how", file=sys.stderr)
+    print_prose(f"surgsim: {text}; outcome_detail in runs.csv says how", sys.stderr)
     return 1
 
 
@@ -111,13 +118,28 @@ def _suite(options: argparse.Namespace):  # type: ignore[no-untyped-def]
         options.names,
         None if options.controllers is None else options.controllers.split(","),
     )
+    _check_name(names[0])
     if is_suite(names[0]):
         if len(names) > 1:
             raise SurgsimError("give one suite, or scenarios; not both")
         suite, folder = load_suite(names[0])
     else:
         suite, folder = ad_hoc_suite(names, None), Path()
-    return with_changes(suite, controllers, options.seeds, options.record), folder
+    return with_changes(suite, controllers, options.seeds, options.record, options.assignments), folder
+
+
+def _check_name(name: str) -> None:
+    """Refuse a name that is neither a shipped suite's nor a scenario's, and no path.
+
+    Raises:
+        SurgsimError: If it is such a name.
+    """
+    from surgsim.errors import SurgsimError, unknown_name
+    from surgsim.scenario.load import shipped
+
+    known = [*shipped("suites"), *shipped()]
+    if name not in known and len(Path(name).parts) < 2 and not Path(name).suffix:
+        raise SurgsimError(f"{unknown_name(name, 'shipped suite or scenario', known)} Or give a .yaml file.")
 
 
 def _jobs(jobs: int | None) -> int:

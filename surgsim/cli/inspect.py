@@ -23,9 +23,9 @@ examples:
   surgsim inspect runs/circle_lwr4plus/vprnn-seed0
   surgsim inspect recording.rrd --view
   surgsim inspect recording.rrd --export run.parquet
-  surgsim inspect runs/circle_lwr4plus/vprnn-seed0 runs/circle_lwr4plus/pinv-seed0 --view
+  surgsim inspect runs/one runs/another --view
   surgsim inspect runs/suites/quick
-  surgsim inspect runs/suites/quick --run circle_lwr4plus/vprnn/base-seed0 --view
+  surgsim inspect runs/suites/quick --run circle_lwr4plus/vprnn/base-seed0
 """
 
 

@@ -11,28 +11,30 @@ import sys
 from collections.abc import Sequence
 
 from surgsim import __version__
+from surgsim.cli.parser import Parser
+from surgsim.cli.table import print_prose
 from surgsim.errors import SurgsimError
 from surgsim.runs.stop import Stopped, stopping_in_order
 
 COMMANDS = ("run", "check", "list", "compare", "report", "inspect", "reproduce", "bench")
 _LONGEST_ERROR = 1000
 _EPILOG = """examples:
-  surgsim run circle_lwr4plus                      run a shipped scenario, write its folder below runs/
-  surgsim run my.yaml --set task.radius_m=0.03     run your own, with one value changed
-  surgsim check my.yaml                            say what is wrong with it, or print it with every default
-  surgsim list controllers                         what can be named in a scenario
-  surgsim compare quick                            a suite of scenarios, controllers and seeds
+  surgsim run circle_lwr4plus          run a shipped scenario
+  surgsim run my.yaml --set task.radius_m=0.03
+                                       run your own, with one value changed
+  surgsim check my.yaml                say what is wrong with it
+  surgsim list controllers             what can be named in a scenario
+  surgsim compare quick                scenarios, controllers and seeds
   surgsim inspect runs/circle_lwr4plus/vprnn-seed0 --view
 """
 
 
 def build_parser() -> argparse.ArgumentParser:
     """The whole command line; imports nothing heavy."""
-    parser = argparse.ArgumentParser(
+    parser = Parser(
         prog="surgsim",
         description="Benchmark for controllers that move a surgical instrument through a trocar.",
         epilog=_EPILOG,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("--version", action="version", version=f"surgsim {__version__}")
     commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
@@ -43,7 +45,6 @@ def build_parser() -> argparse.ArgumentParser:
             help=module.HELP,
             description=module.HELP[0].upper() + module.HELP[1:] + ".",
             epilog=module.EXAMPLES,
-            formatter_class=argparse.RawDescriptionHelpFormatter,
         )
         module.add_arguments(sub)
         sub.set_defaults(execute=module.execute)
@@ -51,10 +52,13 @@ def build_parser() -> argparse.ArgumentParser:
 
 
 def print_error(error: SurgsimError) -> None:
-    """Print what the user can mend on one line of stderr, whatever the names in it."""
+    """Print what the user can mend on one line of stderr, whatever the names in it.
+
+    A terminal breaks it between words.
+    """
     from surgsim.scenario.wording import one_line
 
-    print(f"surgsim: {one_line(str(error), _LONGEST_ERROR)}", file=sys.stderr)
+    print_prose(f"surgsim: {one_line(str(error), _LONGEST_ERROR)}", sys.stderr)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

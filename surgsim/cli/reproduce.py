@@ -17,7 +17,7 @@ appears when the study is whole. A claim that does not hold is a result, not an 
 examples:
   surgsim reproduce manipulability_validation
   surgsim reproduce manipulability_validation --quick --out /tmp/sample
-  surgsim reproduce manipulability_validation --json | jq '.claims[] | select(.verdict != "holds")'
+  surgsim reproduce manipulability_validation --json | jq .claims
 """
 
 

@@ -16,7 +16,7 @@ metrics.json and recording.rrd. It appears when the run is whole.
 examples:
   surgsim run circle_lwr4plus
   surgsim run circle_lwr4plus --controller vprnn --seed 3 --out runs/mine
-  surgsim run circle_lwr4plus --set task.radius_m=0.03 --set trocar.position_m='[0, 0.55, 0.2]'
+  surgsim run circle_lwr4plus --set trocar.position_m='[0, 0.55, 0.2]'
   surgsim run peg_and_ring_panda --operator keyboard
   surgsim run my_scenario.yaml --json | jq .metrics.rcm_error_max_mm
 """

@@ -10,10 +10,6 @@ import textwrap
 from collections.abc import Collection, Sequence
 from typing import TextIO
 
-from rich.cells import cell_len
-from rich.console import Console
-from rich.text import Text
-
 _GAP = 2
 _INDENT = 2
 _ELSEWHERE = 110  # columns, where standard output is no terminal
@@ -38,6 +34,9 @@ def print_table(
         right: Columns of numbers: right-aligned.
         whole: Whether each row stays on one line where standard output is no terminal, however long it is.
     """
+    from rich.console import Console
+    from rich.text import Text
+
     width = terminal_width(sys.stdout)
     if whole and not sys.stdout.isatty():
         width = sys.maxsize
@@ -138,4 +137,9 @@ def _indented(lines: Lines) -> Lines:
 
 
 def _len(text: str) -> int:
+    """Columns that `text` takes on a terminal."""
+    if text.isascii():
+        return len(text)
+    from rich.cells import cell_len
+
     return cell_len(text)

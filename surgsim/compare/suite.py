@@ -250,14 +250,23 @@ def check_runs(specs: Sequence[RunSpec]) -> list[Scenario]:
 
 
 def with_changes(
-    suite: SuiteConfig, controllers: Sequence[str] | None, seeds: str | None, record: bool
+    suite: SuiteConfig,
+    controllers: Sequence[str] | None,
+    seeds: str | None,
+    record: bool,
+    settings: Sequence[str] = (),
 ) -> SuiteConfig:
-    """`suite` with what the command line says instead.
+    """`suite` with what the command line says instead; its `key.path=value` settings hold in every run.
 
     Raises:
-        ScenarioError: If the seeds cannot be read.
+        ScenarioError: If the seeds cannot be read, or a setting is of a key that the suite itself varies.
     """
-    changes: dict[str, Any] = {"record": suite.record or record}
+    for setting in settings:
+        _check_setting(suite, setting)
+    changes: dict[str, Any] = {
+        "record": suite.record or record,
+        "settings": (*suite.settings, *settings),
+    }
     if controllers is not None:
         changes["controllers"] = tuple(_from_here(name) for name in controllers)
     if seeds is not None:
@@ -267,6 +276,26 @@ def with_changes(
             raise ScenarioError("--seeds", str(error)) from error
         changes["seeds"] = seeds
     return suite.model_copy(update=changes)
+
+
+def _check_setting(suite: SuiteConfig, setting: str) -> None:
+    """Refuse a setting that runs would not follow, as the suite sets the key for each of them."""
+    key = setting.partition("=")[0].strip()
+    where = f"--set {setting}"
+    if key == "seed":
+        raise ScenarioError(where, "the seeds of a suite are given by --seeds")
+    if key == "controller":
+        raise ScenarioError(where, "the controllers of a suite are given by --controllers")
+    varied = [name for name in suite.grid if _one_inside_the_other(name, key)]
+    for name, axis in (*suite.axes.items(), *suite.sweeps.items()):
+        if any(_one_inside_the_other(touched, key) for touched in axis.touched_keys()):
+            varied.append(name)
+    if varied:
+        raise ScenarioError(where, f"suite '{suite.name}' varies this itself: {', '.join(varied)}")
+
+
+def _one_inside_the_other(a: str, b: str) -> bool:
+    return f"{a}.".startswith(f"{b}.") or f"{b}.".startswith(f"{a}.")
 
 
 def _from_here(name: str) -> str:

@@ -19,21 +19,25 @@ def shipped(folder: str = "") -> dict[str, Path]:
     return {path.stem: path for path in sorted((resource_dir("scenarios") / folder).glob("*.yaml"))}
 
 
+def shipped_safety() -> dict[str, Path]:
+    """Names, such as `safety/tip_limit`, and files of the scenarios that end early, one for each outcome."""
+    return {f"safety/{name}": path for name, path in shipped("safety").items()}
+
+
 def find(name: str, folder: str, kind: str) -> Path:
     """The file that `name` means: a path, or the name of a shipped file.
 
     Raises:
         ScenarioError: If it is neither.
     """
-    if name in shipped(folder):
-        return shipped(folder)[name]
     path = Path(name)
-    group, _, inner = name.partition("/")
-    if not folder and group == "safety" and inner in shipped(group):
-        return shipped(group)[inner]
-    if path.suffix in (".yaml", ".yml") or len(path.parts) > 1:
+    safety = not folder and name.startswith("safety/") and not path.exists()
+    known = shipped_safety() if safety else shipped(folder)
+    if name in known:
+        return known[name]
+    if path.suffix in (".yaml", ".yml") or (len(path.parts) > 1 and not safety):
         return path
-    raise ScenarioError("", f"{unknown_name(name, f'shipped {kind}', shipped(folder))} Or give a .yaml file.")
+    raise ScenarioError("", f"{unknown_name(name, f'shipped {kind}', known)} Or give a .yaml file.")
 
 
 def load_scenario(

@@ -113,7 +113,21 @@ def test_shards_from_the_command_line(capsys, monkeypatch, folder, done):
 
 WRONG = {
     "suite and scenario": (["quick", "circle_lwr4plus"], "give one suite, or scenarios; not both"),
-    "neither": (["nonsense"], "'nonsense' is not a shipped scenario. Known: "),
+    "neither": (["nonsense"], "'nonsense' is not a shipped suite or scenario. Known: "),
+    "mistyped": (["qiuck"], "'qiuck' is not a shipped suite or scenario. Known: "),
+    "set nothing": (
+        ["quick", "--set", "task.radios_m=1"],
+        "--set task.radios_m=1: task.radios_m: unknown key",
+    ),
+    "set a seed": (["quick", "--set", "seed=3"], "--set seed=3: the seeds of a suite are given by --seeds"),
+    "set a controller": (
+        ["quick", "--set", "controller=qp"],
+        "--set controller=qp: the controllers of a suite are given by --controllers",
+    ),
+    "set what is varied": (
+        ["frontier", "--set", "disturbances=[]"],
+        "--set disturbances=[]: suite 'frontier' varies this itself: ",
+    ),
     "no file": (["nothing.yaml"], "nothing.yaml: cannot be read: "),
     "controller": (["quick", "--controllers", "vprn"], "--controller: 'vprn' is not a shipped controller."),
     "seeds": (["quick", "--seeds", "x"], "--seeds: 'x' is not a list of seeds: write 0:10, 3 or 1,4,9"),

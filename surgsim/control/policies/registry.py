@@ -78,5 +78,13 @@ def find_policy(name: str) -> Policy:
     return policy  # type: ignore[no-any-return]
 
 
+def policy_summary(name: str) -> str:
+    """First line of the policy's docstring, or why it does not load."""
+    try:
+        return (find_policy(name).__doc__ or "").strip().split("\n")[0]
+    except SurgsimError as error:
+        return str(error)
+
+
 def _places() -> dict[str, str]:
     return {**{point.name: point.value for point in entry_points(group=GROUP)}, **_SHIPPED}
