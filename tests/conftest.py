@@ -17,6 +17,8 @@ from surgsim.scenario.schema import Scenario
 from surgsim.tasks.base import TipCommand
 from surgsim.trace.trace import BASE_BLOCKS, Ending, Trace, TraceMeta
 
+pytest_plugins = ["left_out"]
+
 SHORT = (
     "theatre=false",
     "task.duration_s=0.3",

@@ -220,6 +220,14 @@ def test_ci_runs_the_commands_of_the_readme():
         assert f"make {target}" in text_of("README.md")
 
 
+def test_ci_installs_every_extra_and_leaves_no_test_out():
+    makefile, script = text_of("Makefile"), text_of(".ci/run")
+    (extras,) = re.findall(r"install,\$\(ROOT\)\[([\w,]+,[\w,]+)\]", makefile)
+    assert sorted(extras.split(",")) == sorted(PROJECT["project"]["optional-dependencies"])
+    assert "install-all\n" in script
+    assert "PYTEST_ARGS=--no-skips test\n" in script
+
+
 PATHS = ("circle", "sinusoid", "spiral")
 
 

@@ -446,15 +446,8 @@ def test_kill_9_of_the_whole_command_at_a_random_moment(whole, tmp_path):
     assert not list(out.rglob(".*"))
 
 
-def unshare_works():
-    command = ["unshare", "-rm", "mount", "-t", "tmpfs", "tmpfs", "/tmp"]
-    return (
-        shutil.which("unshare") is not None and subprocess.run(command, capture_output=True).returncode == 0
-    )
-
-
 @pytest.mark.slow
-@pytest.mark.skipif(not unshare_works(), reason="this system lets us mount no small disk")
+@pytest.mark.needs("mount")
 def test_a_disk_that_is_really_full(whole, tmp_path):
     """On a disk of 40 KiB, made larger for the second call."""
     script, disk = tmp_path / "script.py", tmp_path / "disk"

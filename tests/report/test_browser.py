@@ -3,16 +3,14 @@
 import re
 import shutil
 
+import left_out
 import pytest
+from playwright import sync_api as playwright
 
 from surgsim.report.write import write_report
 
-playwright = pytest.importorskip(
-    "playwright.sync_api", reason="playwright, of the dev extra, is not installed"
-)
-NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
-CHROMIUM = next(filter(None, map(shutil.which, NAMES)), None)
-pytestmark = pytest.mark.skipif(CHROMIUM is None, reason=f"none of {', '.join(NAMES)} is on the PATH")
+CHROMIUM = next(filter(None, map(shutil.which, left_out.BROWSERS)), None)
+pytestmark = pytest.mark.needs("chromium")
 
 ARGUMENTS = ["--no-sandbox", "--disable-gpu", "--disable-background-networking"]
 CONTRAST = """() => {
