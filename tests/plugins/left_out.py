@@ -1,7 +1,7 @@
 """Tests that need a part of the machine: run where it is; elsewhere left out, counted and named.
 
-A test says what it needs, `@pytest.mark.needs("chromium")`. Without that part it is skipped, and one line at the
-end says how many tests were left out and what brings them in. With `--no-skips`, which CI gives, every skip is a
+A test says what it needs, `@pytest.mark.needs("chromium")`. Without that part it is skipped, and one line at
+the end says how many tests were left out and what brings them in. CI gives `--no-skips`: every skip is then a
 failure, but for those of `ALLOWED`.
 """
 
