@@ -13,6 +13,7 @@ LAYERS = (
     "surgsim.errors",
     "surgsim.resources",
     "surgsim.spatial",
+    "surgsim.compiling",
     "surgsim.compiled",
     "surgsim.linalg",
     "surgsim.columns",

@@ -11,6 +11,7 @@ import sys
 from collections.abc import Sequence
 
 from surgsim import __version__
+from surgsim.cli.kernels import compiling_shown
 from surgsim.cli.parser import Parser
 from surgsim.cli.table import print_prose
 from surgsim.errors import SurgsimError
@@ -64,7 +65,7 @@ def print_error(error: SurgsimError) -> None:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command and return its exit status."""
     try:
-        with stopping_in_order():
+        with stopping_in_order(), compiling_shown():
             options = build_parser().parse_args(arguments)
             return int(options.execute(options))
     except SurgsimError as error:

@@ -10,7 +10,9 @@ from typing import TYPE_CHECKING
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
+from surgsim.cli.kernels import on_screen
 from surgsim.cli.table import fit_prose, print_prose, print_table, terminal_width
+from surgsim.compiled.watch import working_time
 from surgsim.simulate.loop import Progress as ProgressCall
 
 if TYPE_CHECKING:
@@ -85,15 +87,16 @@ def _bar(label: str) -> Iterator[ProgressCall]:
         TextColumn("{task.completed:.1f}/{task.total:.1f} s  {task.fields[factor]}"),
         TimeRemainingColumn(),
     )
-    began = time.perf_counter()
+    began = working_time()
     with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task(label, total=1.0, factor="")
 
         def update(reached_s: float, duration_s: float) -> None:
-            factor = reached_s / max(time.perf_counter() - began, 1e-9)
-            bar.update(task, completed=reached_s, total=duration_s, factor=f"{factor:.1f}x real time")
+            factor = f"{reached_s / max(working_time() - began, 1e-9):.1f}x real time"
+            bar.update(task, description=label, completed=reached_s, total=duration_s, factor=factor)
 
-        yield update
+        with on_screen(lambda text: bar.update(task, description=text)):
+            yield update
 
 
 class _Lines:
@@ -101,10 +104,10 @@ class _Lines:
 
     def __init__(self, label: str) -> None:
         self._label = label
-        self._began = self._last = time.perf_counter()
+        self._began = self._last = working_time()
 
     def __call__(self, reached_s: float, duration_s: float) -> None:
-        now = time.perf_counter()
+        now = working_time()
         if now - self._last >= 5.0:
             self._last = now
             factor = reached_s / (now - self._began)
@@ -136,9 +139,10 @@ def _batch_bar(label: str) -> Iterator[Callable[[int, int, str], None]]:
             nonlocal failed
             failed += outcome != "completed"
             shown = f"{failed} failed" if failed else ""
-            bar.update(task, completed=done, total=total, runs=total, failed=shown)
+            bar.update(task, description=label, completed=done, total=total, runs=total, failed=shown)
 
-        yield update
+        with on_screen(lambda text: bar.update(task, description=text)):
+            yield update
 
 
 class _BatchLines:

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from surgsim.compare.job import CRASHED, WORKER_DIED, DiskError, Job, attempt, write_failure
+from surgsim.compiling import Compiling, listening, tell
 from surgsim.errors import SurgsimError
 from surgsim.runs.drafts import clear_drafts
 from surgsim.runs.stop import held_back, obey_parent
@@ -115,6 +116,9 @@ class _Pool:
             kind, text = worker.pipe.recv()
         except (EOFError, OSError):
             return self.bury(worker)
+        if kind == "compiling":
+            tell(text)
+            return []
         if kind == "ready":
             worker.began, self.stillborn = True, 0
             return []
@@ -191,13 +195,20 @@ def _serve(pipe: Connection) -> None:
     threading.Thread(target=_die_with_parent, daemon=True).start()
     with suppress(OSError):
         pipe.send(("ready", ""))
+
+    def forward(compiling: Compiling) -> None:
+        with suppress(OSError):
+            pipe.send(("compiling", compiling))
+
     while True:
         try:
             job = pipe.recv()
         except (EOFError, OSError):
             return
         try:
-            pipe.send(attempt(job))
+            with listening(forward):
+                answer = attempt(job)
+            pipe.send(answer)
         except OSError:
             return
 

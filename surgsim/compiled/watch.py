@@ -1,35 +1,14 @@
-"""What compiles, and how long it took: for progress, and for clocks that leave it out."""
+"""What compiles, and how long it takes: clocks that leave it out, and word of it to who listens."""
 
 import threading
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
-from dataclasses import dataclass
+import time
 from time import perf_counter
 from typing import Any
 
 from numba.core import event
 
 from surgsim.compiled.lock import release_all
-
-
-@dataclass(frozen=True, kw_only=True)
-class Compiling:
-    """A kernel that is being compiled, or was.
-
-    Attributes:
-        kernel: Its name.
-        done: Kernels that were compiled since the process began.
-        most: Kernels that may have to be, as far as is known now.
-        ended: Whether it is done.
-    """
-
-    kernel: str
-    done: int
-    most: int
-    ended: bool
-
-
-Listener = Callable[[Compiling], None]
+from surgsim.compiling import Compiling, tell
 
 
 class _Counts:
@@ -46,10 +25,11 @@ class _OwnTime(threading.local):
     depth = 0
     began_s = 0.0
     spent_s = 0.0
+    thread_began_ns = 0
+    thread_spent_ns = 0
 
 
 _counts, _own = _Counts(), _OwnTime()
-_listeners: list[Listener] = []
 
 
 def declare(dispatcher: Any) -> None:
@@ -64,34 +44,17 @@ def loaded() -> None:
 
 def began(kernel: str) -> None:
     """Tell that a kernel is being compiled."""
-    tell(Compiling(kernel=kernel, done=_counts.compiled, most=_most(), ended=False))
+    tell(Compiling(kernel=kernel, most=_most(), ended=False))
 
 
 def ended(kernel: str) -> None:
     """Tell that a kernel was compiled."""
     _counts.compiled += 1
-    tell(Compiling(kernel=kernel, done=_counts.compiled, most=_most(), ended=True))
+    tell(Compiling(kernel=kernel, most=_most(), ended=True))
 
 
 def _most() -> int:
-    return max(_counts.declared - _counts.loaded, _counts.compiled + 1)
-
-
-def tell(compiling: Compiling) -> None:
-    """Tell all who listen, of a kernel of this process or of another one."""
-    for listener in list(_listeners):
-        listener(compiling)
-
-
-@contextmanager
-def listening(listener: Listener) -> Iterator[None]:
-    """Have `listener` told of every kernel that is compiled meanwhile."""
-    _listeners.append(listener)
-    try:
-        yield
-    finally:
-        with suppress(ValueError):
-            _listeners.remove(listener)
+    return max(_counts.declared - _counts.loaded, _counts.compiled)
 
 
 def working_time() -> float:
@@ -99,12 +62,17 @@ def working_time() -> float:
     return perf_counter() - _own.spent_s
 
 
+def thread_time_ns() -> int:
+    """Processor time of this thread [ns], without what it spent on compiling or loading kernels."""
+    return time.thread_time_ns() - _own.thread_spent_ns
+
+
 class _Timer(event.Listener):
     """Adds up the time in which a thread holds or awaits numba's compiler."""
 
     def on_start(self, event: Any) -> None:
         if _own.depth == 0:
-            _own.began_s = perf_counter()
+            _own.began_s, _own.thread_began_ns = perf_counter(), time.thread_time_ns()
         _own.depth += 1
 
     def on_end(self, event: Any) -> None:
@@ -112,6 +80,7 @@ class _Timer(event.Listener):
         if _own.depth == 0:
             release_all()
             _own.spent_s += perf_counter() - _own.began_s
+            _own.thread_spent_ns += time.thread_time_ns() - _own.thread_began_ns
 
 
 event.register("numba:compiler_lock", _Timer())

@@ -3,13 +3,13 @@
 import math
 from collections.abc import Callable
 from dataclasses import replace
-from time import thread_time_ns
 
 import numpy as np
 from numpy.typing import NDArray
 
 from surgsim.columns import joints
 from surgsim.compiled import compiled
+from surgsim.compiled.watch import thread_time_ns
 from surgsim.control.controller import ControlOutput
 from surgsim.control.problem import ControlFailure
 from surgsim.errors import Outcome

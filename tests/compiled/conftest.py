@@ -6,7 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from surgsim.compiled import cache, identity, watch
+from surgsim.compiled import cache, identity
+from surgsim.compiling import listening
 
 
 class Workshop:
@@ -50,7 +51,7 @@ def workshop(tmp_path, monkeypatch):
         if compiling.ended:
             made.compiled.append(compiling.kernel.rpartition(".")[2])
 
-    with watch.listening(told):
+    with listening(told):
         yield made
     for name in set(sys.modules) - before:
         if getattr(sys.modules[name], "__file__", None) and str(tmp_path) in str(sys.modules[name].__file__):

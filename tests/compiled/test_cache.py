@@ -116,9 +116,10 @@ SCRIPT = """
 import sys, time
 sys.path.insert(0, sys.argv[1])
 from pathlib import Path
-from surgsim.compiled import cache, watch
+from surgsim.compiled import cache
+from surgsim.compiling import listening
 cache.places = lambda: (Path(sys.argv[1]) / "kept",)
-with watch.listening(lambda told: told.ended and print(told.kernel, flush=True)):
+with listening(lambda told: told.ended and print(told.kernel, flush=True)):
     import user
     print("ready", flush=True)
     sys.stdin.readline()

@@ -1,7 +1,11 @@
 """`@compiled` and `@compiled(SIGNATURE)`."""
 
+from time import perf_counter
+
 import numpy as np
 import pytest
+
+from surgsim.compiled import watch
 
 SHAPES = "from typing import NamedTuple\nclass Seen(NamedTuple):\n    q: object\n    J: object\n"
 TYPED = """
@@ -57,3 +61,13 @@ def test_several_signatures_as_text_and_no_other_types(workshop):
         module.twice("ab")
     workshop.run("user")
     assert workshop.compiled == []
+
+
+def test_clocks_of_a_run_leave_out_what_compiling_took(workshop):
+    workshop.write(user="from surgsim.compiled import compiled\n@compiled\ndef twice(x):\n    return x + x\n")
+    module = workshop.run("user")
+    began, wall, thread = perf_counter(), watch.working_time(), watch.thread_time_ns()
+    module.twice(1.0)
+    took = perf_counter() - began
+    assert watch.working_time() - wall < 0.5 * took
+    assert 1e-9 * (watch.thread_time_ns() - thread) < 0.5 * took
