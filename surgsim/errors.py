@@ -10,7 +10,16 @@ from collections.abc import Iterable
 
 
 class SurgsimError(Exception):
-    """Something that the user can mend: bad input, a file that is damaged, a path out of reach."""
+    """Something that the user can mend: bad input, a file that is damaged, a path out of reach.
+
+    Example:
+        >>> import surgsim
+        >>> try:
+        ...     surgsim.load("circle_lwr4plus", seed=-1)
+        ... except surgsim.SurgsimError as error:
+        ...     print(error)
+        --seed: -1 is not allowed: must be 0 or more
+    """
 
 
 class ScenarioError(SurgsimError):
@@ -33,6 +42,22 @@ class UnreachableError(SurgsimError):
 
 class RecordingError(SurgsimError):
     """A recording or run folder that is missing, damaged or not surgsim's."""
+
+
+class UnknownNameError(SurgsimError, KeyError):
+    """A column, metric or run that is asked for by a name that nothing has; a `KeyError` too."""
+
+    def __str__(self) -> str:
+        """The sentence as it is: a KeyError would put it in quotes."""
+        return str(self.args[0])
+
+
+def not_held(name: object, kind: str, known: Iterable[str], see: str) -> UnknownNameError:
+    """An error that says that `name` is not a `kind`, with the names most like it; `see` lists them all."""
+    shown = str(name)[:60]
+    near = difflib.get_close_matches(shown, list(known), n=3)
+    hint = f"Did you mean {' or '.join(map(repr, near))}?" if near else f"See {see}."
+    return UnknownNameError(f"'{shown}' is not a {kind}. {hint}")
 
 
 def unknown_name(name: str, kind: str, known: Iterable[str]) -> str:

@@ -1,5 +1,6 @@
 """A trace as a table for other tools: Parquet or CSV, one row per control tick."""
 
+import os
 from collections.abc import Callable
 from pathlib import Path
 
@@ -11,7 +12,7 @@ from surgsim.recording.files import replacing, write_file
 from surgsim.trace.trace import Trace
 
 
-def export(trace: Trace, path: Path) -> None:
+def export(trace: Trace, path: str | os.PathLike[str]) -> None:
     """Write the columns of `trace`, in SI units that their names end with.
 
     Parquet carries each column's unit in its field's metadata and the run's meta data (JSON) in the schema's,
@@ -25,9 +26,10 @@ def export(trace: Trace, path: Path) -> None:
     Raises:
         SurgsimError: If the suffix is another one, or the file cannot be written.
     """
-    check_export(path)
-    with replacing(path) as temporary:
-        write_file(temporary, _ENCODERS[path.suffix.lower()](trace))
+    file = Path(path)
+    check_export(file)
+    with replacing(file) as temporary:
+        write_file(temporary, _ENCODERS[file.suffix.lower()](trace))
 
 
 def check_export(path: Path) -> None:

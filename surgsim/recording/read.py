@@ -31,13 +31,13 @@ class Recorded:
     metrics: Mapping[str, float | None]
 
 
-def read_recording(path: Path) -> Recorded:
+def read_recording(path: str | os.PathLike[str]) -> Recorded:
     """Read a recording, or the one in a run's folder.
 
     Raises:
         RecordingError: If there is none, it is damaged or cut short, or surgsim did not write it.
     """
-    file = recording_file(path)
+    file = recording_file(Path(path))
     check_framing(file)
     texts, data = _parse(file, _extract(file))
     header = Header.from_texts(texts)

@@ -1,5 +1,6 @@
 """Writing the report."""
 
+import os
 from collections.abc import Callable
 from pathlib import Path
 
@@ -15,7 +16,11 @@ def _silent(_: str) -> None:
     """Say nothing."""
 
 
-def write_report(folder: Path, out: Path | None = None, say: Callable[[str], None] = _silent) -> Path:
+def write_report(
+    folder: str | os.PathLike[str],
+    out: str | os.PathLike[str] | None = None,
+    say: Callable[[str], None] = _silent,
+) -> Path:
     """Write the report of the batch in `folder`, whole or not at all.
 
     Args:
@@ -29,9 +34,10 @@ def write_report(folder: Path, out: Path | None = None, say: Callable[[str], Non
     Raises:
         SurgsimError: If there are no results, they are damaged, or the disk refuses.
     """
-    results = read_results(folder)
-    file = out if out is not None else folder / NAME
-    series = read_series(folder, results.rows, results.runs.scenarios, say)
+    root = Path(folder)
+    results = read_results(root)
+    file = root / NAME if out is None else Path(out)
+    series = read_series(root, results.rows, results.runs.scenarios, say)
     text = page(results, series, file)
     with replacing(file) as draft:
         write_file(draft, text)

@@ -98,10 +98,7 @@ def write_run(
         SurgsimError: If the folder cannot be written.
     """
     with whole_folder(folder) as draft:
-        outcome = result.trace.meta.ending.to_dict()
-        summary = summary_of(
-            scenario, outcome, result.verdict, result.metrics, result.wall_time_s, result.undefined
-        )
+        summary = summary_of_result(scenario, result)
         if operator_input is not None:
             summary["provenance"]["operator_input_sha256"] = sha256(operator_input.encode()).hexdigest()
             write_file(draft / "operator_input.csv", operator_input)
@@ -152,6 +149,12 @@ def whole_folder(folder: Path) -> Iterator[Path]:
             put_in_place(draft, place)
     except OSError as error:
         raise SurgsimError(f"cannot write {folder}: {error.strerror or error}") from error
+
+
+def summary_of_result(scenario: Scenario, result: RunResult) -> dict[str, Any]:
+    """The content of `metrics.json` of a finished run."""
+    outcome = result.trace.meta.ending.to_dict()
+    return summary_of(scenario, outcome, result.verdict, result.metrics, result.wall_time_s, result.undefined)
 
 
 def summary_of(

@@ -110,7 +110,16 @@ class RecordingConfig(PartConfig):
 
 
 class Scenario(PartConfig):
-    """One experiment: scene, task, controller, plant, disturbances, limits, seed."""
+    """One experiment: scene, task, controller, plant, disturbances, limits, seed.
+
+    It cannot be changed; `surgsim.load(scenario, ...)` gives a changed one.
+
+    Example:
+        >>> import surgsim
+        >>> scenario = surgsim.load("circle_lwr4plus")
+        >>> scenario.robot.name, scenario.task.radius_m, scenario.simulation.control_period_s
+        ('lwr4plus', 0.02, 0.001)
+    """
 
     schema_version: Literal[1] = 1
     name: Name
