@@ -5,6 +5,7 @@ import os
 import re
 import shlex
 import sys
+from collections.abc import Mapping
 from contextlib import redirect_stdout
 from pathlib import Path
 from typing import Any
@@ -41,6 +42,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--shard", metavar="I/N", default="1/1", help="only every Nth run, from the Ith")
     parser.add_argument("--record", action="store_true", help="write a recording of every run")
     parser.add_argument("--metric", default="rcm_error_rms_mm", help="metric of the leaderboard")
+    parser.add_argument(
+        "--matters",
+        action="append",
+        default=[],
+        metavar="METRIC=VALUE",
+        help="smallest difference that matters",
+    )
     parser.add_argument("--json", action="store_true", help="print the leaderboard as JSON")
 
 
@@ -72,7 +80,7 @@ def execute(options: argparse.Namespace) -> int:
                 f"{out}: other shards' runs are missing; --resume makes the table once they are there"
             )
             return 1
-        _print(table, options)
+        _print(table, options, suite.matters)
         print_prose(f"{table.num_rows} runs; wrote {out / 'runs.parquet'} and runs.csv", sys.stderr)
         print_prose(f"wrote {write_report(out)}", sys.stderr)
     except Stopped as stopped:
@@ -111,6 +119,7 @@ def _check(options: argparse.Namespace) -> None:
 
 def _suite(options: argparse.Namespace):  # type: ignore[no-untyped-def]
     """The suite that the command line means, and the folder of its relative paths."""
+    from surgsim.compare.matters import parse_matters
     from surgsim.compare.suite import ad_hoc_suite, is_suite, load_suite, with_changes
     from surgsim.errors import SurgsimError
 
@@ -125,7 +134,15 @@ def _suite(options: argparse.Namespace):  # type: ignore[no-untyped-def]
         suite, folder = load_suite(names[0])
     else:
         suite, folder = ad_hoc_suite(names, None), Path()
-    return with_changes(suite, controllers, options.seeds, options.record, options.assignments), folder
+    changed = with_changes(
+        suite,
+        controllers,
+        options.seeds,
+        options.record,
+        options.assignments,
+        parse_matters(options.matters),
+    )
+    return changed, folder
 
 
 def _check_name(name: str) -> None:
@@ -173,7 +190,7 @@ def _runner(options: argparse.Namespace):  # type: ignore[no-untyped-def]
     return ray_runner(options.address)
 
 
-def _print(table: Any, options: argparse.Namespace) -> None:
+def _print(table: Any, options: argparse.Namespace, matters: Mapping[str, float]) -> None:
     import json
 
     from surgsim.cli.output import print_leaderboard, print_paragraphs
@@ -181,7 +198,7 @@ def _print(table: Any, options: argparse.Namespace) -> None:
     from surgsim.compare.observations import Observations
     from surgsim.compare.summary import summary
 
-    runs = Observations.of(table)
+    runs = Observations.of(table, matters)
     rows = leaderboard(runs, options.metric)
     if options.json:
         print(json.dumps(rows, indent=2, default=vars))

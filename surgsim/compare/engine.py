@@ -150,7 +150,8 @@ def _prepare(batch: Batch) -> None:
         if any(not path.name.startswith(_DRAFT) for path in out.iterdir()):
             _check_old(batch, about)
         _clear(out)
-        whole = sealed({**about, "command": batch.command, "provenance": provenance()})
+        told = {"matters": batch.suite.matters, "command": batch.command, "provenance": provenance()}
+        whole = sealed({**about, **told})
         with replacing(file) as draft:
             write_file(draft, json.dumps(whole, indent=2) + "\n")
     except OSError as error:

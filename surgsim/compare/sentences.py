@@ -88,7 +88,8 @@ def _relative(pairs: Pairs) -> str:
     if not (pairs.mean_b > 0.0 and pairs.mean_a > 0.0):
         return ""
     change = 100.0 * (pairs.mean_a / pairs.mean_b - 1.0)
-    return f" ({change:+.0f} %)".replace("-", "−") if 1.0 <= abs(change) <= 1000.0 else ""
+    digits = 1 if change < -99.0 else 0  # a little is left of b
+    return f" ({change:+.{digits}f} %)".replace("-", "−") if 1.0 <= abs(change) <= 1000.0 else ""
 
 
 def _paired(pairs: Pairs) -> int:

@@ -4,16 +4,17 @@ import itertools
 import json
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Self
 
-from pydantic import AfterValidator, Field, model_validator
+from pydantic import AfterValidator, Field, FiniteFloat, field_validator, model_validator
 
 from surgsim.catalog import Name, PartConfig
 from surgsim.compare.axis import AxisConfig, Values
-from surgsim.errors import ScenarioError, SurgsimError
+from surgsim.errors import ScenarioError, SurgsimError, unknown_name
+from surgsim.metrics.catalog import METRICS
 from surgsim.scenario.load import find, load_scenario, shipped
 from surgsim.scenario.schema import Scenario
 from surgsim.scenario.validate import validate
@@ -61,6 +62,7 @@ class SuiteConfig(PartConfig):
         seeds: `0:10`, `3` or `1,4,9`.
         record: Whether every run writes its recording.
         settings: `key.path=value` settings of every run.
+        matters: Smallest differences that matter, by metric, in its unit; the metrics' own for the others.
     """
 
     name: Name
@@ -73,6 +75,15 @@ class SuiteConfig(PartConfig):
     seeds: Annotated[str, AfterValidator(_check_seeds)] = "0"
     record: bool = False
     settings: tuple[str, ...] = ()
+    matters: dict[str, Annotated[FiniteFloat, Field(ge=0.0)]] = Field(default_factory=dict)
+
+    @field_validator("matters")
+    @classmethod
+    def _of_metrics(cls, matters: dict[str, float]) -> dict[str, float]:
+        for name in matters:
+            if name not in METRICS:
+                raise ValueError(unknown_name(name, "metric", METRICS))
+        return matters
 
     @model_validator(mode="after")
     def _seeds_have_one_place(self) -> Self:
@@ -255,6 +266,7 @@ def with_changes(
     seeds: str | None,
     record: bool,
     settings: Sequence[str] = (),
+    matters: Mapping[str, float] | None = None,
 ) -> SuiteConfig:
     """`suite` with what the command line says instead; its `key.path=value` settings hold in every run.
 
@@ -266,6 +278,7 @@ def with_changes(
     changes: dict[str, Any] = {
         "record": suite.record or record,
         "settings": (*suite.settings, *settings),
+        "matters": {**suite.matters, **(matters or {})},
     }
     if controllers is not None:
         changes["controllers"] = tuple(_from_here(name) for name in controllers)

@@ -131,5 +131,5 @@ def _least(metric: Metric, matters: float) -> str:
     if not matters:
         return ""
     words, unit = heading_of(metric)
-    source = f" ({metric.matters_source})" if matters == metric.matters else " (set for this batch)"
-    return f"Differences of {words} below {exactly(matters, unit)} count as none{source}."
+    source = f"that is {metric.matters_source}" if matters == metric.matters else "set for this batch"
+    return f"Differences of {words} below {exactly(matters, unit)} count as none; {source}."

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from surgsim.trace.trace import Trace
 
 REPEATABILITY = "how well the arms come back to a pose (ISO 9283; data sheets: Panda 0.1 mm, LWR 4+ 0.05 mm)"
-FORCE_RESOLUTION = "force resolution of the Panda (data sheet: 0.05 N)"
+FORCE_RESOLUTION = "the force resolution of the Panda (data sheet: 0.05 N)"
 CHOICE = "a choice of this project"
 
 

@@ -1,12 +1,13 @@
 """Writing the report."""
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from surgsim.recording.files import replacing, write_file
 from surgsim.report.page import page
 from surgsim.report.results import read_results
+from surgsim.report.scenes import scenes_of
 from surgsim.report.series import read_series
 
 NAME = "report.html"
@@ -20,6 +21,7 @@ def write_report(
     folder: str | os.PathLike[str],
     out: str | os.PathLike[str] | None = None,
     say: Callable[[str], None] = _silent,
+    matters: Mapping[str, float] | None = None,
 ) -> Path:
     """Write the report of the batch in `folder`, whole or not at all.
 
@@ -27,6 +29,7 @@ def write_report(
         folder: Results folder of `surgsim compare`.
         out: File to write; `report.html` in the folder if None.
         say: Told what takes long.
+        matters: Smallest differences that matter, by metric, instead of the suite's.
 
     Returns:
         The file.
@@ -34,11 +37,15 @@ def write_report(
     Raises:
         SurgsimError: If there are no results, they are damaged, or the disk refuses.
     """
-    root = Path(folder)
+@@@    root = Path(folder)
     results = read_results(root)
     file = root / NAME if out is None else Path(out)
     series = read_series(root, results.rows, results.runs.scenarios, say)
     text = page(results, series, file)
+///    results = read_results(folder, matters)
+    file = out if out is not None else folder / NAME
+    series = read_series(folder, results.rows, results.runs.scenarios, say)
+    text = page(results, series, scenes_of(results), file)
     with replacing(file) as draft:
         write_file(draft, text)
     return file

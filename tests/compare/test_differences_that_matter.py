@@ -7,9 +7,12 @@ import pytest
 
 from surgsim.compare.aggregates import ranks, scores
 from surgsim.compare.leaderboard import leaderboard
+from surgsim.compare.matters import parse_matters
 from surgsim.compare.places import places_of
 from surgsim.compare.statistics import compare_pair
+from surgsim.compare.suite import SuiteConfig, with_changes
 from surgsim.compare.verdict import Verdict
+from surgsim.errors import SurgsimError
 from surgsim.metrics.catalog import METRICS
 
 TIP = "tip_error_rms_mm"
@@ -127,3 +130,23 @@ def test_every_metric_says_what_matters_and_is_headed_by_words(metric):
     assert metric.matters >= 0.0
     assert metric.matters_source
     assert (metric.matters == 0.0) == (metric.matters_source == "any difference counts")
+
+
+def test_the_command_line_says_what_matters():
+    assert parse_matters(["rcm_error_rms_mm=0.5", "sparc=0"]) == {"rcm_error_rms_mm": 0.5, "sparc": 0.0}
+    for text in ("rcm_error_rms_mm", "rcm_error_rms_mm=much", "rcm_error_rms_mm=-1", "rcm_error_rms_mm=nan"):
+        with pytest.raises(SurgsimError) as caught:
+            parse_matters([text])
+        assert str(caught.value) == f"--matters: '{text}' is not METRIC=VALUE with a value of 0 or more"
+    with pytest.raises(SurgsimError, match="'rcm_error' is not a metric"):
+        parse_matters(["rcm_error=1"])
+
+
+def test_a_suite_says_what_matters():
+    told = {"rcm_error_rms_mm": 0.5}
+    suite = SuiteConfig(name="s", scenarios=("circle_lwr4plus",), matters=told)
+    assert with_changes(suite, None, None, False, matters={"sparc": 1.0}).matters == {**told, "sparc": 1.0}
+    with pytest.raises(ValueError, match="'speed' is not a metric"):
+        SuiteConfig(name="s", scenarios=("circle_lwr4plus",), matters={"speed": 1.0})
+    with pytest.raises(ValueError, match="greater than or equal to 0"):
+        SuiteConfig(name="s", scenarios=("circle_lwr4plus",), matters={"sparc": -1.0})

@@ -99,7 +99,7 @@ def test_a_failure_without_a_disturbance_is_the_first(made_up, tmp_path):
 
 def test_sweeps_are_not_drawn_a_second_time_with_the_scenario(swept):
     assert "<b>[kg]</b>" not in swept
-    assert " against payload," not in _section(swept, "scenario-0")
+    assert " against payload," not in _section(swept, "scenarios")
     assert '<a href="#robustness">' in swept
     assert '<a href="#frontier">' not in swept
 

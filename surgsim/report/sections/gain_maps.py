@@ -30,7 +30,7 @@ def maps_section(results: Results) -> str:
     parts = []
     for name, metric in itertools.product(results.runs.scenarios, _METRICS):
         if metric in results.metrics:
-            title = f"{metric}, {name}" if several else metric
+            title = f"{metric_label(metric)}, {name}" if several else metric_label(metric)
             drawn = _maps(results.runs.of_scenario(name), results.runs.controllers, (x, y), others, metric)
             parts.append(f"<h3>{html.escape(title)}</h3>{drawn}")
     return html.section("frontier", "Frontier", html.paragraph(note), *parts)

@@ -3,6 +3,7 @@
 import numpy as np
 
 from surgsim.compare.aggregates import performance_profile, scores
+from surgsim.metrics.catalog import METRICS
 from surgsim.report import html
 from surgsim.report.figures.curves import Curve, curve_plot
 from surgsim.report.figures.intervals import interval_plot
@@ -17,13 +18,21 @@ def ranking_section(results: Results, boards: Boards) -> str:
     if not boards:
         return ""
     names = results.runs.controllers
-    parts = [_of_metric(results, boards, metric) for metric in results.headline]
+    main, *rest = results.headline
     note = (
         "A score of 1 is the typical run of the setting's best controller (a setting is a scenario and a "
         "grid point); a score of 10 is ten times worse. The profile is the share of all runs that score at "
-        "most τ: a controller that fails never reaches the top."
+        "most τ: a controller that completed all its runs reaches the top, one that fails never does."
     )
-    return html.section("ranking", "Rank over scenarios", html.paragraph(note), html.legend(names), *parts)
+    folded = [
+        html.details(f"The same by {METRICS[metric].heading}", _of_metric(results, boards, metric))
+        for metric in rest
+    ]
+    title = f"<h3>{html.escape(METRICS[main].heading)}</h3>"
+    drawn = _of_metric(results, boards, main)
+    return html.section(
+        "ranking", "Rank over scenarios", html.paragraph(note), html.legend(names), title, drawn, *folded
+    )
 
 
 def _of_metric(results: Results, boards: Boards, metric: str) -> str:
@@ -32,8 +41,8 @@ def _of_metric(results: Results, boards: Boards, metric: str) -> str:
     ranked = sorted(rows, key=lambda row: row[2].rank.value if row[2].rank.value is not None else np.inf)
     rank = interval_plot([(name, i, row.rank) for name, i, row in ranked], "mean rank, 1 is best")
     score = interval_plot([(name, i, row.score) for name, i, row in ranked], "normalised score, 1 is best")
-    return f"<h3>{html.escape(metric)}</h3>" + html.figures(
-        html.figure(rank, "Mean rank", "over scenarios, failures last"),
+    return html.figures(
+        html.figure(rank, "Mean rank", "over scenarios, failures last; ties share it"),
         html.figure(score, "Interquartile mean of scores", f"completed runs only{_failures(boards, metric)}"),
         html.figure(_profile(results, metric), "Performance profile", "share of all runs, 95 % bands"),
     )

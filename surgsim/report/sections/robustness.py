@@ -42,7 +42,7 @@ def _scenario(runs: Observations, results: Results, sweeps: Sequence[Axis]) -> s
     parts = [_table(runs, results.runs.controllers, sweeps)]
     for metric in (name for name in _METRICS if name in results.metrics):
         panels = [_panel(runs, results.runs.controllers, sweep, sweeps, metric) for sweep in sweeps]
-        parts += [f"<h4>{html.escape(metric)}</h4>", html.figures(*panels)]
+        parts.append(html.details(f"{metric_label(metric)} over the levels", html.figures(*panels)))
     return "".join(parts)
 
 
