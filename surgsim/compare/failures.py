@@ -1,23 +1,24 @@
-"""Where controllers fail: runs that did not complete, tasks not done, shafts that left the port."""
+"""Where controllers fail: runs that did not complete, tasks not done, thresholds exceeded."""
 
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from surgsim.compare.observations import Observations
-from surgsim.compare.wording import listed, number
+from surgsim.compare.observations import Mask, Observations
+from surgsim.compare.wording import heading_of, listed, with_unit
 from surgsim.metrics.accuracy import CONVERGED_RCM_M
+from surgsim.metrics.catalog import METRICS
 
 WORST_RCM_MM = 1e3 * CONVERGED_RCM_M
-"""Largest RCM error of a run that counts as done [mm]; the convergence time's bound of the shaft."""
-_RCM = "rcm_error_max_mm"
+"""Largest RCM error of a run that holds a level of a sweep [mm]; the convergence time's bound."""
+_FAILED, _NOT_DONE = "failed", "not done"
 
 
 @dataclass(frozen=True, kw_only=True)
 class Failing:
-    """Controllers of which the same is to be said.
+    """Controllers that fail in the same respects.
 
     Attributes:
         controllers: Their names.
@@ -36,21 +37,15 @@ class Failing:
 
 
 def failing(runs: Observations) -> list[Failing]:
-    """Where each controller fails, failures first; controllers of which the same is true are together."""
-    told: dict[str, list[str]] = {}
+    """Where each controller fails, failures first; those that fail in the same respects are together."""
+    groups: dict[tuple[str, ...], list[str]] = {}
     for name in runs.controllers:
-        told.setdefault(_told(runs.of_controller(name)), []).append(name)
-    found = [_failing(runs, tuple(names), text) for text, names in told.items()]
+        groups.setdefault(tuple(_respects(runs.of_controller(name))), []).append(name)
+    found = [
+        Failing(controllers=tuple(names), text=_told(runs, names, respects), bad=bool(respects))
+        for respects, names in groups.items()
+    ]
     return sorted(found, key=lambda one: not one.bad)
-
-
-def _failing(runs: Observations, names: tuple[str, ...], text: str) -> Failing:
-    mine = runs.where(np.isin(runs.controller.astype(str), names))
-    if not text:
-        return Failing(controllers=names, text=_all_well(mine.of_controller(names[0])), bad=False)
-    errors = mine.values(_RCM)
-    worst = f", at worst {number(float(np.nanmax(errors)))} mm" if (errors > WORST_RCM_MM).any() else ""
-    return Failing(controllers=names, text=text + worst, bad=True)
 
 
 def outcome_words(name: str) -> str:
@@ -64,30 +59,60 @@ def counted_outcomes(counts: Mapping[str, int]) -> str:
     return ", ".join(f"{count} {outcome_words(name)}" for name, count in items if count)
 
 
-def _told(runs: Observations) -> str:
-    """What is wrong with one controller's runs; empty if nothing is."""
-    failed, past = ~runs.completed, runs.values(_RCM) > WORST_RCM_MM
-    parts = []
-    if failed.any():
-        how = counted_outcomes(Counter(runs.outcome[failed].tolist()))
-        parts.append(f"{int(failed.sum())} of {len(runs)} runs failed ({how}{_where(runs, failed)})")
-    if runs.not_done.any():
-        count = f"{int(runs.not_done.sum())} of {len(runs)} runs"
-        parts.append(f"{count} completed, task not done{_where(runs, runs.not_done)}")
-    if past.any():
-        count = f"{int(past.sum())} of {int(runs.completed.sum())} completed runs"
-        parts.append(f"RCM error past {WORST_RCM_MM:g} mm in {count}{_where(runs, past)}")
+def _respects(runs: Observations) -> dict[str, Mask]:
+    """In what respects runs of one controller fail, and which do."""
+    found = {_FAILED: ~runs.completed, _NOT_DONE: runs.not_done}
+    for metric in METRICS:
+        past = [metric in text.split(",") for text in runs.exceeded.tolist()]
+        found[metric] = np.asarray(runs.completed & np.array(past, dtype=bool), dtype=bool)
+    return {respect: mask for respect, mask in found.items() if mask.any()}
+
+
+def _told(runs: Observations, names: Sequence[str], respects: Sequence[str]) -> str:
+    """What is to be said of controllers that fail in these respects."""
+    each = [runs.of_controller(name) for name in names]
+    if not respects:
+        done = " and did its task" if all(bool((one.success == 1.0).all()) for one in each) else ""
+        count = "every run" if any(len(one) > 1 for one in each) else "the run"
+        return f"nowhere, {count} completed{done}, and no threshold was exceeded"
+    parts = [_unfinished(respect, each) for respect in respects if respect in (_FAILED, _NOT_DONE)]
+    past: dict[str, list[str]] = {}
+    for metric in respects:
+        if metric not in (_FAILED, _NOT_DONE):
+            past.setdefault(_share(metric, each), []).append(_worst(metric, each))
+    parts += [f"past thresholds in {share}: {', '.join(worst)}" for share, worst in past.items()]
     return "; ".join(parts)
 
 
-def _all_well(runs: Observations) -> str:
-    kept = np.isfinite(runs.values(_RCM)).all()
-    shaft = f" with an RCM error of at most {WORST_RCM_MM:g} mm" if kept else ""
-    count = f"all {len(runs)} runs" if len(runs) > 1 else "its one run"
-    return f"nowhere, {count} completed{shaft}"
+def _unfinished(respect: str, each: Sequence[Observations]) -> str:
+    """In how many runs the end was not reached, and how those ended; or the task was not done."""
+    if respect == _NOT_DONE:
+        return f"completed, task not done in {_share(respect, each)}"
+    ends = Counter(outcome for runs in each for outcome in runs.outcome[~runs.completed].tolist())
+    return f"failed in {_share(respect, each)} ({counted_outcomes(ends)})"
 
 
-def _where(runs: Observations, mask: np.ndarray) -> str:
-    """The scenarios of some runs, unless they are all of them or there is only one."""
-    there = list(dict.fromkeys(runs.scenario[mask].tolist()))
-    return "" if len(there) == len(runs.scenarios) else f", in {listed(there)}"
+def _share(respect: str, each: Sequence[Observations]) -> str:
+    """In how many runs of each controller it fails in one respect, and in which scenarios."""
+    masks = [_respects(runs)[respect] for runs in each]
+    completed = respect not in (_FAILED, _NOT_DONE)
+    totals = {int(runs.completed.sum()) if completed else len(runs) for runs in each}
+    counts = sorted({int(mask.sum()) for mask in masks})
+    share = f"{counts[0]} to {counts[-1]}" if len(counts) > 1 else f"{counts[0]}"
+    share += f" of {totals.pop()}" if len(totals) == 1 else ""
+    return share + (" each" if len(each) > 1 else "") + _where(each, masks)
+
+
+def _worst(metric: str, each: Sequence[Observations]) -> str:
+    """The metric and its largest value in completed runs."""
+    words, unit = heading_of(METRICS[metric])
+    worst = max(float(np.nanmax(runs.values(metric))) for runs in each)
+    return f"{words} (up to {with_unit(worst, unit)})"
+
+
+def _where(each: Sequence[Observations], masks: Sequence[Mask]) -> str:
+    """The scenarios of some runs, unless they are all of them."""
+    there = [name for runs, mask in zip(each, masks, strict=True) for name in runs.scenario[mask].tolist()]
+    every = {name for runs in each for name in runs.scenarios}
+    found = list(dict.fromkeys(there))
+    return "" if len(found) == len(every) else f", in {listed(found)}"

@@ -31,6 +31,7 @@ class Observations:
         outcome: Names of the outcomes (n,).
         metrics: Values by metric's name (n,); NaN where a metric is not defined.
         success: Whether the task was done (n,), 1 or 0; NaN where the task does not say.
+        exceeded: Metrics past their thresholds (n,), as text with commas.
         smallest: Smallest differences that matter, by metric, where others than the metrics' own are wanted.
     """
 
@@ -41,6 +42,7 @@ class Observations:
     outcome: Texts
     metrics: Mapping[str, Array]
     success: Array
+    exceeded: Texts
     smallest: Mapping[str, float] = field(default_factory=dict)
 
     @staticmethod
@@ -60,12 +62,17 @@ class Observations:
             }
             seed = np.array(table.column("seed").to_pylist(), dtype=np.int64)
             metrics = {name: _numbers(table, name) for name in METRICS}
-            told = "success" in table.column_names
-            success = _numbers(table, "success") if told else np.full(table.num_rows, np.nan)
+            success = _numbers(table, "success")
+            exceeded = [text or "" for text in table.column("exceeded").to_pylist()]
         except (KeyError, TypeError, ValueError, pa.ArrowException) as error:
             raise SurgsimError(f"not a table of batch results: {error}") from error
         return Observations(
-            **texts, seed=seed, metrics=metrics, success=success, smallest=dict(smallest or {})
+            **texts,
+            seed=seed,
+            metrics=metrics,
+            success=success,
+            exceeded=np.array(exceeded, dtype=object),
+            smallest=dict(smallest or {}),
         )
 
     def __len__(self) -> int:
@@ -114,6 +121,7 @@ class Observations:
             seed=self.seed[mask],
             outcome=self.outcome[mask],
             success=self.success[mask],
+            exceeded=self.exceeded[mask],
             metrics={name: values[mask] for name, values in self.metrics.items()},
         )
 
