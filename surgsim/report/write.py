@@ -37,14 +37,10 @@ def write_report(
     Raises:
         SurgsimError: If there are no results, they are damaged, or the disk refuses.
     """
-@@@    root = Path(folder)
-    results = read_results(root)
+    root = Path(folder)
+    results = read_results(root, matters)
     file = root / NAME if out is None else Path(out)
     series = read_series(root, results.rows, results.runs.scenarios, say)
-    text = page(results, series, file)
-///    results = read_results(folder, matters)
-    file = out if out is not None else folder / NAME
-    series = read_series(folder, results.rows, results.runs.scenarios, say)
     text = page(results, series, scenes_of(results), file)
     with replacing(file) as draft:
         write_file(draft, text)
