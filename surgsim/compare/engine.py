@@ -15,9 +15,10 @@ from surgsim.compare.suite import RunSpec, SuiteConfig, check_runs, expand
 from surgsim.compare.table import Row, write_table
 from surgsim.compare.workers import Done, run_jobs
 from surgsim.errors import SurgsimError
+from surgsim.recording.contents import fault_of
 from surgsim.recording.files import replacing, write_file
+from surgsim.recording.folders import make_folder
 from surgsim.recording.sealed import read_sealed, sealed
-from surgsim.runs.contents import fault_of, make_folder
 from surgsim.runs.drafts import clear_drafts
 from surgsim.runs.exchange import restore_all
 from surgsim.runs.provenance import provenance

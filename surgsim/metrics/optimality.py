@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surgsim.control.self_motion import SelfMotion, SelfMotionPoint
-from surgsim.metrics.metric import CHOICE, Metric
+from surgsim.metrics.metric import CHOICE, Metric, Undefined
 from surgsim.models.arm import ArmModel
 from surgsim.models.config import SceneConfig
 from surgsim.trace.trace import Trace
@@ -54,8 +54,15 @@ def attainable_manipulability(
 
 
 def manipulability_optimality(trace: Trace) -> float:
-    """Mean over time of mu / mu*; 1 is on the optimum throughout. mu* is interpolated between its samples."""
-    rows, best = attainable_manipulability(trace, SAMPLES, _COARSE_RAD)
+    """Mean over time of mu / mu*; 1 is on the optimum throughout. mu* is interpolated between its samples.
+
+    Raises:
+        Undefined: If the arm is singular where self-motion is followed: it has no direction there.
+    """
+    try:
+        rows, best = attainable_manipulability(trace, SAMPLES, _COARSE_RAD)
+    except np.linalg.LinAlgError as error:
+        raise Undefined("the arm is singular in this run: its self-motion cannot be followed") from error
     return float(np.mean(trace["manipulability"] / np.interp(np.arange(len(trace)), rows, best)))
 
 

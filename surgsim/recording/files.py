@@ -5,7 +5,6 @@ place, by a system call that says so at once.
 """
 
 import contextlib
-import errno
 import fcntl
 import os
 import uuid
@@ -13,14 +12,14 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from surgsim.errors import SurgsimError
+from surgsim.recording.folders import sync_folder
 
 _SUFFIX = ".partial"
-_NO_FOLDER_SYNC = {errno.EINVAL, errno.EBADF, errno.ENOTSUP, errno.EACCES}
 _TRIES = 3
 
 
 def write_file(path: Path, content: bytes | str) -> None:
-    """Write a file, text as UTF-8, and wait until it is on the disk.
+    """Write a file, text as UTF-8; `replacing` and `whole_folder` wait until it is on the disk.
 
     Raises:
         OSError: If the disk refuses.
@@ -30,26 +29,8 @@ def write_file(path: Path, content: bytes | str) -> None:
     try:
         while left:
             left = left[os.write(handle, left) :]
-        os.fsync(handle)
     finally:
         os.close(handle)
-
-
-def sync_folder(folder: Path) -> None:
-    """Wait until the names in `folder` are on the disk; a file system that cannot is passed over.
-
-    Raises:
-        OSError: If the disk refuses.
-    """
-    try:
-        handle = os.open(folder, os.O_RDONLY)
-        try:
-            os.fsync(handle)
-        finally:
-            os.close(handle)
-    except OSError as error:
-        if error.errno not in _NO_FOLDER_SYNC:
-            raise
 
 
 @contextlib.contextmanager
@@ -75,7 +56,7 @@ def replacing(path: Path) -> Iterator[Path]:
         raise SurgsimError(f"{path}: cannot be written: {error.strerror or error}") from error
     finally:
         if handle is not None:
-            os.close(handle)
+            release(handle)
             _remove(temporary)
 
 
@@ -94,6 +75,12 @@ def lock(handle: int) -> bool | None:
     return True
 
 
+def release(handle: int) -> None:
+    """Close what was open for its lock alone: an error has nothing to tell, and must not hide another one."""
+    with contextlib.suppress(OSError):
+        os.close(handle)
+
+
 def _clear(path: Path) -> None:
     """Remove temporary siblings of `path` that no process holds."""
     for left in path.parent.glob(f".{_literal(path.name)}.*{_SUFFIX}"):
@@ -103,7 +90,7 @@ def _clear(path: Path) -> None:
                 if lock(handle):
                     left.unlink()
             finally:
-                os.close(handle)
+                release(handle)
 
 
 def _literal(name: str) -> str:

@@ -8,10 +8,10 @@ import os
 import shutil
 import tempfile
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from surgsim.recording.files import lock
+from surgsim.recording.files import lock, release
 
 _SUFFIX = ".part"
 _TRIES = 3
@@ -32,7 +32,7 @@ def draft_of(folder: Path) -> Iterator[Path]:
         draft.chmod(0o755)
         yield draft
     finally:
-        os.close(handle)
+        release(handle)
         remove_tree(draft)
 
 
@@ -65,7 +65,8 @@ def hidden(parent: Path, name: str, suffix: str) -> list[Path]:
 def remove_tree(folder: Path) -> None:
     """Remove a folder if it is there; a disk that refuses is asked again, and hides no earlier error."""
     for _ in range(_TRIES):
-        shutil.rmtree(folder, ignore_errors=True)
+        with suppress(OSError):  # of closing a folder, which `ignore_errors` does not cover
+            shutil.rmtree(folder, ignore_errors=True)
         if not folder.exists():
             return
 
@@ -83,7 +84,7 @@ def _locked(folder: Path) -> tuple[Path, int]:
             raise
         if lock(handle) is not False and draft.exists():
             return draft, handle
-        os.close(handle)
+        release(handle)
 
 
 def _remove_if_left(draft: Path) -> None:
@@ -95,4 +96,4 @@ def _remove_if_left(draft: Path) -> None:
         if lock(handle):
             remove_tree(draft)
     finally:
-        os.close(handle)
+        release(handle)

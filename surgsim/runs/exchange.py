@@ -16,7 +16,8 @@ from contextlib import contextmanager, suppress
 from functools import lru_cache
 from pathlib import Path
 
-from surgsim.recording.files import sync_folder
+from surgsim.recording.files import release
+from surgsim.recording.folders import sync_folder
 from surgsim.runs.drafts import hidden, remove_tree
 
 _HERE = -100  # AT_FDCWD
@@ -141,12 +142,12 @@ def _turn(place: Path) -> Iterator[None]:
         except FileNotFoundError:  # its last holder removed it
             pass
         except BaseException:
-            os.close(handle)
+            release(handle)
             raise
-        os.close(handle)
+        release(handle)
     try:
         yield
     finally:
         with suppress(OSError):
             os.unlink(file)
-        os.close(handle)
+        release(handle)

@@ -13,9 +13,10 @@ from typing import Any
 from surgsim.compiled.watch import working_time
 from surgsim.errors import SurgsimError
 from surgsim.metrics.catalog import evaluate
+from surgsim.recording.contents import SUMMARY, contents_of
 from surgsim.recording.files import write_file
+from surgsim.recording.folders import make_folder, sync_tree
 from surgsim.recording.sealed import sealed
-from surgsim.runs.contents import SUMMARY, contents_of, make_folder, sync_contents
 from surgsim.runs.drafts import draft_of
 from surgsim.runs.exchange import put_in_place, restore
 from surgsim.runs.provenance import provenance
@@ -68,6 +69,7 @@ def run_to_folder(
     """
     check_target(folder)
     result = execute(scenario, progress)
+    check_target(folder)  # it may have been filled meanwhile
     write_run(scenario, result, folder, record=record)
     return result
 
@@ -145,7 +147,7 @@ def whole_folder(folder: Path) -> Iterator[Path]:
         restore(place)
         with draft_of(place) as draft:
             yield draft
-            sync_contents(draft)
+            sync_tree(draft)
             put_in_place(draft, place)
     except OSError as error:
         raise SurgsimError(f"cannot write {folder}: {error.strerror or error}") from error

@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 from surgsim.errors import RecordingError
-from surgsim.recording.files import sync_folder
 from surgsim.recording.sealed import read_sealed
 
 SUMMARY = "metrics.json"
@@ -37,8 +36,10 @@ def fault_of(folder: Path, summary: Mapping[str, Any]) -> str:
                 return f"{name} is damaged: it has {found} bytes, and had {stated['bytes']}"
             if _content(folder / name) != stated:
                 return f"{name} is damaged: it does not hold what was written"
+        except FileNotFoundError:
+            return f"{name} is missing"
         except OSError as error:
-            return f"{name} is damaged: {error.strerror or error}"
+            return f"{name} cannot be read: {error.strerror or error}"
     return ""
 
 
@@ -58,35 +59,6 @@ def check_contents(folder: Path) -> None:
         fault = f"{SUMMARY} does not state the run's files: another version of surgsim wrote it"
     if fault:
         raise RecordingError(f"{folder}: {fault}")
-
-
-def sync_contents(folder: Path) -> None:
-    """Wait until all files and folders in `folder`, and itself, are on the disk.
-
-    Raises:
-        OSError: If the disk refuses.
-    """
-    for path, _, names in os.walk(folder):
-        for name in names:
-            handle = os.open(os.path.join(path, name), os.O_RDONLY)
-            try:
-                os.fsync(handle)
-            finally:
-                os.close(handle)
-        sync_folder(Path(path))
-
-
-def make_folder(folder: Path) -> None:
-    """Make a folder and those above it, each of them on the disk; nothing happens if it is there.
-
-    Raises:
-        OSError: If the disk refuses.
-    """
-    if folder.is_dir():
-        return
-    make_folder(folder.parent)
-    folder.mkdir(exist_ok=True)
-    sync_folder(folder.parent)
 
 
 def _content(file: Path) -> dict[str, Any]:
