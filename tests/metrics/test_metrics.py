@@ -1,13 +1,14 @@
 """Every metric on made traces whose values are known."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from surgsim.errors import Outcome
 from surgsim.metrics.catalog import METRICS, compute_metrics, evaluate
-from surgsim.metrics.metric import Metric, Undefined
+from surgsim.metrics.metric import Undefined
 from surgsim.metrics.timing import TIMING_METRICS
 from surgsim.simulate.loop import simulate
 
@@ -125,8 +126,7 @@ def test_a_metric_that_raises_is_none_with_its_reason_and_costs_no_other(
 ):
     trace = trace_of(4, tip_error=[0.003, 0.004, 0.0, 0.0])
     plain = evaluate(trace)
-    broken = Metric(name="sparc", meaning="", compute=_raising(error))
-    monkeypatch.setitem(METRICS, "sparc", broken)
+    monkeypatch.setitem(METRICS, "sparc", replace(METRICS["sparc"], compute=_raising(error)))
     found = evaluate(trace)
     assert found.undefined == {**plain.undefined, "sparc": reason}
     assert found.values == {**plain.values, "sparc": None}
