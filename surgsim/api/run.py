@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 from surgsim.api.metrics import Metrics
 from surgsim.display import WIDTH, html_title
 from surgsim.errors import RecordingError
+from surgsim.recording.contents import check_contents
 from surgsim.recording.read import read_recording
 from surgsim.recording.sealed import read_sealed
-from surgsim.runs.contents import check_contents
 from surgsim.scenario.load import load_scenario
 from surgsim.scenario.schema import Scenario
 from surgsim.trace.trace import Trace
