@@ -17,7 +17,7 @@ from surgsim.cli.table import print_prose
 from surgsim.errors import SurgsimError
 from surgsim.runs.stop import Stopped, stopping_in_order
 
-COMMANDS = ("run", "check", "list", "compare", "report", "inspect", "reproduce", "bench")
+COMMANDS = ("run", "check", "list", "compare", "report", "inspect", "reproduce", "bench", "completion")
 _LONGEST_ERROR = 1000
 _EPILOG = """examples:
   surgsim run circle_lwr4plus          run a shipped scenario

@@ -8,7 +8,8 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+from rich.progress import BarColumn, Progress, ProgressColumn, Task, TextColumn, TimeRemainingColumn
+from rich.text import Text
 
 from surgsim.cli.kernels import on_screen
 from surgsim.cli.table import fit_prose, print_prose, print_table, terminal_width
@@ -80,10 +81,24 @@ def show_progress(label: str, quiet: bool = False) -> Iterator[ProgressCall | No
         yield _Lines(label)
 
 
+_BAR = 16  # columns
+_BESIDE = _BAR + len(" 100.0/100.0 s  10.0x real time 0:00:00 ")
+
+
+class _Description(ProgressColumn):
+    """What is going on, cut where there is no room for it beside the bar and its figures."""
+
+    def render(self, task: Task) -> Text:
+        """Its text for the width of the terminal."""
+        text = Text(task.description, no_wrap=True)
+        text.truncate(max(1, terminal_width(sys.stderr) - _BESIDE), overflow="ellipsis")
+        return text
+
+
 def _bar(label: str) -> Iterator[ProgressCall]:
     columns = (
-        TextColumn("{task.description}"),
-        BarColumn(),
+        _Description(),
+        BarColumn(_BAR),
         TextColumn("{task.completed:.1f}/{task.total:.1f} s  {task.fields[factor]}"),
         TimeRemainingColumn(),
     )
@@ -126,8 +141,8 @@ def show_batch_progress(label: str) -> Iterator[Callable[[int, int, str], None]]
 
 def _batch_bar(label: str) -> Iterator[Callable[[int, int, str], None]]:
     columns = (
-        TextColumn("{task.description}"),
-        BarColumn(),
+        _Description(),
+        BarColumn(_BAR),
         TextColumn("{task.completed:.0f}/{task.fields[runs]} runs  {task.fields[failed]}"),
         TimeRemainingColumn(),
     )

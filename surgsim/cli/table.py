@@ -57,6 +57,19 @@ def print_prose(text: str, file: TextIO | None = None) -> None:
     print("\n".join(lines), file=file)
 
 
+def print_text(text: str) -> None:
+    """Print lines; on a terminal, what is too long goes on below, deeper, as YAML allows."""
+    width = terminal_width(sys.stdout)
+    for line in text.splitlines():
+        inner = line.lstrip()
+        if not sys.stdout.isatty() or _len(line) <= width:
+            print(line)
+            continue
+        indent = " " * (len(line) - len(inner))
+        first, *others = fit_prose(inner, width - len(indent) - 2 * _INDENT)
+        print("\n".join([indent + first, *(f"{indent}{' ' * 2 * _INDENT}{other}" for other in others)]))
+
+
 def terminal_width(file: TextIO) -> int:
     """Columns of the terminal that `file` is, or of a page elsewhere."""
     try:

@@ -241,7 +241,7 @@ def test_check_prints_the_resolved_scenario_which_is_the_same_scenario(capsys, t
     resolved.write_text(out)
     scenario = load_scenario(str(resolved))
     assert (scenario.seed, scenario.task.radius_m) == (4, 0.03)
-    assert re.match(rf"# circle_lwr4plus: ok, 11 s; sha256 {scenario.sha256()}\n", out)
+    assert re.match(rf"# circle_lwr4plus: ok, 11 s\n# sha256 {scenario.sha256()}\n", out)
 
 
 def test_check_looks_at_every_scenario_and_exits_2_if_any_is_wrong(capsys):
