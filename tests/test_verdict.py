@@ -148,7 +148,8 @@ def test_an_insertion_is_done_at_depth():
 def test_a_task_whose_judgement_fails_costs_no_run():
     found = verdict(run("peg_and_ring_panda", {}))  # without the columns of its board
     assert found.success is None
-    assert found.reason == "it could not be judged, KeyError: 'ring_state'"
+    assert found.reason.startswith("it could not be judged, ")
+    assert "'ring_state'" in found.reason
     assert found.to_dict()["thresholds"] == []
 
 
