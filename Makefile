@@ -48,8 +48,8 @@ check: $(INSTALLED_DEV)  ## formatting, lint and types, as CI
 bench: $(INSTALLED)  ## measure the speed on this machine
 	@cd '$(ROOT)' && "$(PY)" -m surgsim bench
 
-pictures: $(INSTALLED_DEV)  ## draw the scene pictures of docs/images again; needs OpenGL
-	@cd '$(ROOT)' && "$(PY)" docs/images/draw.py
+pictures: $(INSTALLED_DEV)  ## draw the pictures of docs/images again; needs OpenGL, and Vulkan for the viewer
+	@cd '$(ROOT)' && "$(PY)" docs/images/draw.py && "$(PY)" docs/images/viewer.py
 
 wheel: $(INSTALLED_DEV)  ## build the wheel into dist/
 	@cd '$(ROOT)' && "$(PY)" -m pip wheel --quiet --no-build-isolation --no-deps --wheel-dir dist .

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 Integers = NDArray[np.int64]
 
 _WORD = np.dtype("<i8")
+_ZERO = np.zeros(1, dtype=_WORD)
 _HIGHEST_ORDER = 4  # a fifth difference gains little and makes noise worse
 _WINDOWS = 8  # places of a column at which the orders are tried
 _WINDOW_ROWS = 256
@@ -29,9 +30,10 @@ def encode(data: NDArray[np.float64]) -> bytes:
     """Pack `data` (rows, columns) without loss: a byte for each column's order, then the zstd stream."""
     values = np.ascontiguousarray(data.T, dtype="<f8").view(_WORD)
     orders = _orders(values)
-    planes = _zigzag(_differences(values, orders)).view(np.uint8).reshape(*values.shape, _WORD.itemsize)
-    stream = _codec().compress(np.ascontiguousarray(planes.transpose(0, 2, 1)).data, asbytes=True)
-    return orders.tobytes() + bytes(stream)
+    planes = np.empty((len(values), _WORD.itemsize, values.shape[1]), dtype=np.uint8)
+    for column, order, out in zip(values, orders, planes, strict=True):  # one column stays in the cache
+        out[:] = _zigzag(_differences(column, int(order))).view(np.uint8).reshape(-1, _WORD.itemsize).T
+    return orders.tobytes() + bytes(_codec().compress(planes.data, asbytes=True))
 
 
 def decode(packed: bytes, rows: int, columns: int) -> NDArray[np.float64]:
@@ -49,8 +51,9 @@ def decode(packed: bytes, rows: int, columns: int) -> NDArray[np.float64]:
         planes = np.frombuffer(stream, dtype=np.uint8).reshape(columns, _WORD.itemsize, rows)
     except (pa.ArrowException, OSError, OverflowError, MemoryError, ValueError) as error:
         raise ValueError(f"damaged recording: no {rows} rows of {columns} columns in it") from error
-    words = np.ascontiguousarray(planes.transpose(0, 2, 1)).view(_WORD)[:, :, 0]
-    values = _sums(_unzigzag(words), orders)
+    values = np.empty((columns, rows), dtype=_WORD)
+    for column, order, words in zip(values, orders, planes, strict=True):
+        column[:] = _sums(_unzigzag(np.ascontiguousarray(words.T).view(_WORD)[:, 0]), int(order))
     return np.ascontiguousarray(values.view("<f8").T, dtype=np.float64)
 
 
@@ -83,21 +86,18 @@ def _bits(numbers: Integers) -> Integers:
     return exponents.clip(1022) - 1022  # the exponent of 0 is 0, that of 1 is 1023
 
 
-def _differences(values: Integers, orders: NDArray[np.uint8]) -> Integers:
-    """Differences of every row of `values`, each of its own order; the first numbers stay as they are."""
-    values = values.copy()
-    for order in range(1, _HIGHEST_ORDER + 1):
-        chosen = orders >= order
-        values[chosen, 1:] = np.diff(values[chosen], axis=1)
-    return values
+def _differences(column: Integers, order: int) -> Integers:
+    """Differences of `column` (rows,) of an order; at each, the first number stays as it is."""
+    for _ in range(order):
+        column = np.diff(column, prepend=_ZERO)
+    return column
 
 
-def _sums(values: Integers, orders: NDArray[np.uint8]) -> Integers:
+def _sums(column: Integers, order: int) -> Integers:
     """Inverse of `_differences`."""
-    for order in range(_HIGHEST_ORDER, 0, -1):
-        chosen = orders >= order
-        values[chosen] = np.cumsum(values[chosen], axis=1)
-    return values
+    for _ in range(order):
+        column = np.cumsum(column)
+    return column
 
 
 def _zigzag(numbers: Integers) -> Integers:

@@ -47,7 +47,7 @@ def inside_view(scenario: Scenario, trace: Trace, *, below: str = "") -> rrb.Spa
     aside = unit(_from_base(scenario, middle, _ASIDE))
     eye = middle + _PATH_RADII * radius * unit(_STEEPNESS * up + aside)
     return rrb.Spatial3DView(
-        name="Inside, at the tip. Path: desired blue, actual black",
+        name="Inside. Path: desired blue, actual black",
         origin=scene,
         contents=[f"+ {scene}/**", *(f"- {scene}/patient/{cover}/**" for cover in _COVERS)],
         background=_BACKGROUND,

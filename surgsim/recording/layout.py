@@ -84,7 +84,7 @@ class Header:
         return {
             "schema_version": str(SCHEMA_VERSION),
             "trace_meta": self.meta.to_json(),
-            "metrics": json.dumps(dict(self.metrics), sort_keys=True),
+            "metrics": json.dumps(dict(self.metrics)),
             "layout": json.dumps({"blocks": blocks, "rows": self.rows}, sort_keys=True),
         }
 

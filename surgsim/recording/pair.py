@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
@@ -16,9 +17,10 @@ from surgsim.recording.scene import log_scene, scenario_of
 from surgsim.recording.signals import log_signals
 from surgsim.recording.stream import stream_to
 from surgsim.recording.write import log_texts
-from surgsim.trace.trace import Trace
+from surgsim.trace.trace import Array, Trace
 
 _SIDES = ("a", "b")
+_MARGIN = 0.05  # above and below the signals, as a share of their range
 
 
 def write_pair(path: Path, pair: Sequence[Recorded]) -> None:
@@ -64,11 +66,27 @@ class _Below:
 
 
 def _blueprint(traces: Sequence[Trace]) -> rrb.Blueprint:
-    columns = [_column(f"{side}/", trace) for side, trace in zip(_SIDES, traces, strict=True)]
+    errors = common_axis([1e3 * trace[name] for trace in traces for name in ("tip_error_m", "rcm_error_m")])
+    manipulability = common_axis([trace["manipulability"] for trace in traces])
+    columns = [
+        _column(f"{side}/", trace, errors, manipulability) for side, trace in zip(_SIDES, traces, strict=True)
+    ]
     return laid_out(rrb.Horizontal(*columns))
 
 
-def _column(below: str, trace: Trace) -> rrb.Vertical:
+def common_axis(signals: Sequence[Array]) -> rrb.ScalarAxis | None:
+    """An axis that holds all of the signals, so that plots side by side compare; None if none is finite."""
+    finite = np.concatenate([signal[np.isfinite(signal)] for signal in signals])
+    if not finite.size:
+        return None
+    low, high = float(finite.min()), float(finite.max())
+    margin = _MARGIN * max(high - low, 1e-9)
+    return rrb.ScalarAxis(range=(low - margin, high + margin))
+
+
+def _column(
+    below: str, trace: Trace, errors: rrb.ScalarAxis | None, manipulability: rrb.ScalarAxis | None
+) -> rrb.Vertical:
     """Scene, errors, manipulability, torques and texts of one run."""
     scenario = scenario_of(trace)
     return rrb.Vertical(
@@ -77,11 +95,11 @@ def _column(below: str, trace: Trace) -> rrb.Vertical:
             inside_view(scenario, trace, below=below),
         ),
         rrb.Horizontal(
-            errors_plot(below),
-            plot("Manipulability", f"{below}{series_path('manipulability')}"),
+            errors_plot(below, errors),
+            plot("Manipulability", f"{below}{series_path('manipulability')}", axis_y=manipulability),
             joint_plots(trace, below)[-1],
         ),
         joint_key(below),
         texts_view(below),
-        row_shares=[0.45, 0.3, 0.06, 0.19],
+        row_shares=[0.42, 0.27, 0.07, 0.24],
     )

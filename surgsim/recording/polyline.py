@@ -28,12 +28,22 @@ def drawn_rows(values: Array) -> NDArray[np.intp]:
 
 def _tolerances(values: Array) -> Array:
     """Distance (signals,) that nobody sees."""
-    finite = np.isfinite(values)
-    highest = np.where(finite, values, -np.inf).max(axis=0)
-    lowest = np.where(finite, values, np.inf).min(axis=0)
-    ranges = np.maximum(highest - lowest, 0.0)  # -inf where nothing is finite
+    ranges = _ranges(values)
     share: Array = TOLERANCE * np.maximum(ranges, _SMALLEST_SHARE * ranges.max(initial=0.0))
     return share
+
+
+@compiled
+def _ranges(values: Array) -> Array:
+    """Range (signals,) of the finite samples of each signal; 0 where there are none."""
+    count, width = values.shape
+    low, high = np.full(width, np.inf), np.full(width, -np.inf)
+    for i in range(count):
+        for k in range(width):
+            if np.isfinite(values[i, k]):
+                low[k], high[k] = min(low[k], values[i, k]), max(high[k], values[i, k])
+    ranges: Array = np.maximum(high - low, 0.0)
+    return ranges
 
 
 @compiled

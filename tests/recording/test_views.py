@@ -146,6 +146,14 @@ def test_metrics_that_do_not_apply_are_left_out(trace: Trace) -> None:
     assert "trocar_force_max_n" not in text
 
 
+def test_two_runs_side_by_side_share_their_axes(trace: Trace) -> None:
+    from surgsim.recording.pair import common_axis
+
+    axis = common_axis([np.array([0.0, 1.0, np.nan]), np.array([np.inf, 3.0])])
+    assert_allclose(axis.range.as_arrow_array().to_pylist()[0], [-0.15, 3.15])
+    assert common_axis([np.full(3, np.nan)]) is None
+
+
 def test_twenty_smooth_seconds_fit_in_eight_megabytes(trace: Trace, tmp_path) -> None:
     t = 1e-3 * np.arange(20_001)
     speeds = np.linspace(0.3, 3.0, len(trace.columns))
