@@ -69,6 +69,12 @@ def unknown_name(name: str, kind: str, known: Iterable[str]) -> str:
     return f"{text} Did you mean '{near[0]}'?" if near else text
 
 
+def told(error: BaseException) -> str:
+    """What went wrong in a part, on one line."""
+    text = " ".join(str(error).split())
+    return text if isinstance(error, ImportError | AttributeError) else f"{type(error).__name__}: {text}"
+
+
 class Outcome(enum.Enum):
     """How a run ended. The value is the sentence that a person reads."""
 

@@ -17,7 +17,18 @@ from surgsim.cli.table import print_prose
 from surgsim.errors import SurgsimError
 from surgsim.runs.stop import Stopped, stopping_in_order
 
-COMMANDS = ("run", "check", "list", "compare", "report", "inspect", "reproduce", "bench", "completion")
+COMMANDS = (
+    "run",
+    "check",
+    "list",
+    "compare",
+    "report",
+    "inspect",
+    "reproduce",
+    "bench",
+    "test-part",
+    "completion",
+)
 _LONGEST_ERROR = 1000
 _EPILOG = """examples:
   surgsim run circle_lwr4plus          run a shipped scenario
@@ -40,7 +51,7 @@ def build_parser() -> argparse.ArgumentParser:
     parser.add_argument("--version", action="version", version=f"surgsim {__version__}")
     commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
     for name in COMMANDS:
-        module = importlib.import_module(f"surgsim.cli.{name}")
+        module = importlib.import_module(f"surgsim.cli.{name.replace('-', '_')}")
         sub = commands.add_parser(
             name,
             help=module.HELP,
