@@ -78,7 +78,7 @@ $(INSTALLED_DEV): | $(PY)
 	@touch '$(INSTALLED)' '$(INSTALLED_DEV)'
 
 $(INSTALLED_ALL): | $(PY)
-	$(call install,$(ROOT)[dev,gymnasium,ray])
+	$(call install,$(ROOT)[dev,gymnasium,pandas,ray])
 	@touch '$(INSTALLED)' '$(INSTALLED_DEV)' '$(INSTALLED_ALL)'
 
 $(PY):
