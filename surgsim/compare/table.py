@@ -54,7 +54,7 @@ def schema() -> pa.Schema:
     fields += [pa.field("exceeded", pa.string())]
     fields += [pa.field(name, pa.float64()) for name in METRICS]
     fields += [pa.field("wall_time_s", pa.float64())]
-    texts = ("scenario_sha256", "surgsim_version", "commit", "machine", "folder", "recording")
+    texts = ("scenario_sha256", "surgsim_version", "code_sha256", "commit", "machine", "folder", "recording")
     return pa.schema(fields + [pa.field(name, pa.string()) for name in texts])
 
 
@@ -87,6 +87,7 @@ def read_row(root: Path, row: Row) -> dict[str, Any]:
             "wall_time_s": provenance["wall_time_s"],
             "scenario_sha256": provenance["scenario_sha256"],
             "surgsim_version": provenance["surgsim"],
+            "code_sha256": provenance["code_sha256"],
             "commit": provenance["commit"],
             "machine": provenance["machine"],
             "folder": row.folder,

@@ -19,7 +19,7 @@ from surgsim.recording.folders import make_folder, sync_tree
 from surgsim.recording.sealed import sealed
 from surgsim.runs.drafts import draft_of
 from surgsim.runs.exchange import put_in_place, restore
-from surgsim.runs.provenance import provenance
+from surgsim.runs.provenance import provenance_of
 from surgsim.scenario.schema import Scenario
 from surgsim.scenario.yaml_text import dump_yaml
 from surgsim.simulate.loop import Progress, simulate
@@ -177,5 +177,5 @@ def summary_of(
         **verdict.to_dict(),
         "metrics": dict(metrics),
         "undefined": dict(undefined or {}),
-        "provenance": {**provenance(), "scenario_sha256": scenario.sha256(), "wall_time_s": round(wall_s, 6)},
+        "provenance": {**provenance_of(scenario), "wall_time_s": round(wall_s, 6)},
     }

@@ -190,6 +190,24 @@ def change(folder, key, value):
     (folder / "metrics.json").write_text(json.dumps(sealed(summary)))
 
 
+def lose_key(folder, key):
+    summary = read_sealed(folder / "metrics.json")
+    del summary["provenance"][key]
+    (folder / "metrics.json").write_text(json.dumps(sealed(summary)))
+
+
+def test_other_code_is_named(copy, whole, capsys):
+    folder = copy / read_table(whole)["folder"][2].as_py()
+    provenance = read_sealed(folder / "metrics.json")["provenance"]
+    change(folder, "packages", {**provenance["packages"], "mujoco": "3.0.0", "rerun-sdk": "0.1"})
+    change(folder, "code_sha256", "0" * 64)
+    compare(batch(copy, resume=True), runner=Counting())
+    now = provenance["packages"]["mujoco"]
+    count = read_table(whole).num_rows
+    told = f"1 of {count} runs were made by other code (mujoco 3.0.0 not {now}) and are run again"
+    assert capsys.readouterr().err == f"surgsim: {told}\n"
+
+
 @pytest.mark.parametrize(
     "spoil",
     [
@@ -199,8 +217,8 @@ def change(folder, key, value):
         lose_scenario,
         lose_file,
         lose_folder,
-        lambda folder: change(folder, "commit", "0" * 40),
-        lambda folder: change(folder, "surgsim", "0.0.0"),
+        lambda folder: change(folder, "code_sha256", "0" * 64),
+        lambda folder: lose_key(folder, "code_sha256"),
         lambda folder: change(folder, "scenario_sha256", "0" * 64),
     ],
     ids=[
@@ -210,8 +228,8 @@ def change(folder, key, value):
         "no scenario",
         "no file",
         "no folder",
-        "another commit",
-        "another version",
+        "other code",
+        "no word of the code",
         "another scenario",
     ],
 )

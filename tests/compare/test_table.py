@@ -18,7 +18,7 @@ from surgsim.recording.sealed import sealed
 
 TEXT = {"run_id", "suite", "scenario", "controller", "parameters", "outcome", "outcome_detail"}
 TEXT |= {"success_reason", "exceeded"}
-TEXT |= {"scenario_sha256", "surgsim_version", "commit", "machine", "folder", "recording"}
+TEXT |= {"scenario_sha256", "code_sha256", "surgsim_version", "commit", "machine", "folder", "recording"}
 
 
 HELD = {"metric": "rcm_error_max_mm", "value": 9.0, "most": 5.0, "source": "x", "exceeded": True}
@@ -37,6 +37,7 @@ def summary(**changes):
         "metrics": {name: 1.0 / (3 + i) for i, name in enumerate(METRICS)},
         "provenance": {
             "surgsim": "1.0",
+            "code_sha256": "cd",
             "commit": None,
             "machine": "Linux x86_64",
             "scenario_sha256": "ab",

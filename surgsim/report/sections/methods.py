@@ -61,6 +61,6 @@ def versions_section(results: Results) -> str:
     shown = "".join(
         f"<dt>{html.escape(name)}</dt><dd>{html.escape(value)}</dd>" for name, value in facts if value
     )
-    mixed = len({(row["surgsim_version"], row["commit"]) for row in results.rows}) > 1
-    warning = html.paragraph("Runs of several versions are mixed.", "warning") if mixed else ""
+    mixed = len({row["code_sha256"] for row in results.rows}) > 1
+    warning = html.paragraph("Runs of several versions of the code are mixed.", "warning") if mixed else ""
     return html.section("versions", "Versions", warning, f"<dl>{shown}</dl>")
