@@ -48,7 +48,7 @@ check: $(INSTALLED_DEV)  ## formatting, lint and types, as CI
 bench: $(INSTALLED)  ## measure the speed on this machine
 	@cd '$(ROOT)' && "$(PY)" -m surgsim bench
 
-pictures: $(INSTALLED_DEV)  ## draw the pictures of docs/images again; needs OpenGL, and Vulkan for the viewer
+pictures: $(INSTALLED_DEV)  ## make pictures, tables and leaderboard pages of the documents again; needs OpenGL, and Vulkan for the viewer
 	@cd '$(ROOT)' && "$(PY)" docs/images/draw.py && "$(PY)" docs/images/viewer.py
 
 wheel: $(INSTALLED_DEV)  ## build the wheel into dist/
