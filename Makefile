@@ -11,7 +11,9 @@ STATE := $(shell { echo '$(ROOT)'; cat '$(ROOT)/pyproject.toml' '$(ROOT)/constra
 INSTALLED := $(VENV)/.surgsim-$(STATE)
 INSTALLED_DEV := $(VENV)/.surgsim-dev-$(STATE)
 INSTALLED_ALL := $(VENV)/.surgsim-all-$(STATE)
-PIP_INSTALL := "$(PY)" -m pip install --quiet --disable-pip-version-check -c "$(ROOT)/constraints.txt"
+PIP_INSTALL := "$(PY)" -m pip install --disable-pip-version-check -c "$(ROOT)/constraints.txt"
+# pip says nothing while it unpacks: every ten seconds a line tells how much is there.
+ALIVE := began=$$(date +%s); { while sleep 10 > /dev/null 2>&1; do printf '  installing for %s s, %s MB so far\n' "$$(($$(date +%s) - began))" "$$(du -sm '$(VENV)' | cut -f1)" >&2; done; } & trap "kill $$! 2> /dev/null" EXIT;
 OLD_ENOUGH := import sys; v = sys.version_info; sys.exit(0 if v >= (3, 11) else "surgsim needs Python 3.11 or newer; %s is %d.%d. Set PYTHON=/path/to/python3.11" % (sys.executable, v[0], v[1]))
 
 .DEFAULT_GOAL := help
@@ -63,9 +65,9 @@ clean:  ## remove build products and caches; .venv and runs stay
 define install
 	@"$(PY)" -c '$(OLD_ENOUGH)'
 	@"$(PY)" -m pip --version > /dev/null 2>&1 || "$(PY)" -m ensurepip
-	@echo 'installing surgsim into $(VENV)' >&2
-	@$(PIP_INSTALL) hatchling editables
-	@$(PIP_INSTALL) --no-build-isolation -e '$(1)'
+	@echo 'installing surgsim into $(VENV): about 1.3 GB, some minutes' >&2
+	@$(PIP_INSTALL) --quiet hatchling editables
+	@$(ALIVE) $(PIP_INSTALL) --no-build-isolation -e '$(1)' >&2
 	@rm -f '$(VENV)'/.surgsim-*
 endef
 

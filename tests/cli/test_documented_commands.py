@@ -52,6 +52,8 @@ SHORTER = {
     "surgsim compare seeds --out runs/seeds --shard 2/2": FEW,
     "surgsim compare seeds --out runs/seeds --resume": FEW,
     "surgsim compare circle_lwr4plus --controllers vprnn,policy_proportional": SHORT,
+    "surgsim compare circle_lwr4plus --controllers vprnn,pinv --set task.radius_m=0.01 "
+    "--out runs/small_circle": SHORT,
     "surgsim compare theatre --out runs/theatre": f"{SHORT} --controllers vprnn --seeds 0:2",
     "surgsim compare breathing_tracked --out runs/breathing_tracked": f"{SHORT} --controllers vprnn",
     "surgsim compare breathing_hidden --out runs/breathing_hidden": f"{SHORT} --controllers vprnn",
