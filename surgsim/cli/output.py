@@ -99,16 +99,17 @@ def _bar(label: str) -> Iterator[ProgressCall]:
     columns = (
         _Description(),
         BarColumn(_BAR),
-        TextColumn("{task.completed:.1f}/{task.total:.1f} s  {task.fields[factor]}"),
+        TextColumn("{task.fields[reached]}"),
         TimeRemainingColumn(),
     )
     began = working_time()
     with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task(label, total=1.0, factor="")
+        task = bar.add_task(label, total=None, reached="")
 
         def update(reached_s: float, duration_s: float) -> None:
             factor = f"{reached_s / max(working_time() - began, 1e-9):.1f}x real time"
-            bar.update(task, description=label, completed=reached_s, total=duration_s, factor=factor)
+            reached = f"{reached_s:.1f}/{duration_s:.1f} s  {factor}"
+            bar.update(task, description=label, completed=reached_s, total=duration_s, reached=reached)
 
         with on_screen(lambda text: bar.update(task, description=text)):
             yield update
@@ -143,18 +144,18 @@ def _batch_bar(label: str) -> Iterator[Callable[[int, int, str], None]]:
     columns = (
         _Description(),
         BarColumn(_BAR),
-        TextColumn("{task.completed:.0f}/{task.fields[runs]} runs  {task.fields[failed]}"),
+        TextColumn("{task.fields[reached]}"),
         TimeRemainingColumn(),
     )
     failed = 0
     with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task(label, total=None, runs="?", failed="")
+        task = bar.add_task(label, total=None, reached="")
 
         def update(done: int, total: int, outcome: str) -> None:
             nonlocal failed
             failed += outcome != "completed"
-            shown = f"{failed} failed" if failed else ""
-            bar.update(task, description=label, completed=done, total=total, runs=total, failed=shown)
+            reached = f"{done}/{total} runs" + (f"  {failed} failed" if failed else "")
+            bar.update(task, description=label, completed=done, total=total, reached=reached)
 
         with on_screen(lambda text: bar.update(task, description=text)):
             yield update
