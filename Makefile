@@ -10,13 +10,16 @@ RUN := runs/circle_lwr4plus/vprnn-seed0
 STATE := $(shell { echo '$(ROOT)'; cat '$(ROOT)/pyproject.toml' '$(ROOT)/constraints.txt'; } | cksum | tr ' ' '-')
 INSTALLED := $(VENV)/.surgsim-$(STATE)
 INSTALLED_DEV := $(VENV)/.surgsim-dev-$(STATE)
-PIP_INSTALL := "$(PY)" -m pip install --quiet --disable-pip-version-check -c "$(ROOT)/constraints.txt"
+INSTALLED_ALL := $(VENV)/.surgsim-all-$(STATE)
+PIP_INSTALL := "$(PY)" -m pip install --disable-pip-version-check -c "$(ROOT)/constraints.txt"
+# pip says nothing while it unpacks: every ten seconds a line tells how much is there.
+ALIVE := began=$$(date +%s); { while sleep 10 > /dev/null 2>&1; do printf '  installing for %s s, %s MB so far\n' "$$(($$(date +%s) - began))" "$$(du -sm '$(VENV)' | cut -f1)" >&2; done; } & trap "kill $$! 2> /dev/null" EXIT;
 OLD_ENOUGH := import sys; v = sys.version_info; sys.exit(0 if v >= (3, 11) else "surgsim needs Python 3.11 or newer; %s is %d.%d. Set PYTHON=/path/to/python3.11" % (sys.executable, v[0], v[1]))
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
 .NOTPARALLEL:
-.PHONY: help install install-dev run test test-all check bench pictures wheel clean
+.PHONY: help install install-dev install-all run test test-all check bench pictures wheel clean
 
 help:  ## list the targets
 	@sed -n 's/^\([a-z-]*\):.*  ## \(.*\)/\1|\2/p' '$(ROOT)/Makefile' | awk -F'|' '{ printf "%-12s %s\n", $$1, $$2 }'
@@ -25,17 +28,19 @@ install: $(INSTALLED)  ## create .venv and install surgsim in it (editable)
 
 install-dev: $(INSTALLED_DEV)  ## the same with the tools of tests and checks
 
+install-all: $(INSTALLED_ALL)  ## the same with every extra, as CI has it
+
 run: $(INSTALLED)  ## run the circle scenario, then inspect its recording
 	@cd '$(ROOT)' && "$(PY)" -m surgsim run circle_lwr4plus --out '$(RUN)'
 	@echo
 	@cd '$(ROOT)' && "$(PY)" -m surgsim inspect '$(RUN)'
 	@echo && echo 'written to $(ROOT)/$(RUN):' && ls -l '$(ROOT)/$(RUN)'
 
-test: $(INSTALLED_DEV)  ## run the tests, slow ones left out
-	@cd '$(ROOT)' && "$(PY)" -m pytest -n 2 -m "not slow"
+test: $(INSTALLED_DEV)  ## run the tests, slow ones left out; PYTEST_ARGS=... are given to pytest
+	@cd '$(ROOT)' && "$(PY)" -m pytest -n 2 -m "not slow" $(PYTEST_ARGS)
 
 test-all: $(INSTALLED_DEV)  ## run all tests
-	@cd '$(ROOT)' && "$(PY)" -m pytest -n 2
+	@cd '$(ROOT)' && "$(PY)" -m pytest -n 2 $(PYTEST_ARGS)
 
 check: $(INSTALLED_DEV)  ## formatting, lint and types, as CI
 	@cd '$(ROOT)' && "$(PY)" -m ruff format --check .
@@ -45,8 +50,8 @@ check: $(INSTALLED_DEV)  ## formatting, lint and types, as CI
 bench: $(INSTALLED)  ## measure the speed on this machine
 	@cd '$(ROOT)' && "$(PY)" -m surgsim bench
 
-pictures: $(INSTALLED_DEV)  ## draw the scene pictures of docs/images again; needs OpenGL
-	@cd '$(ROOT)' && "$(PY)" docs/images/draw.py
+pictures: $(INSTALLED_DEV)  ## make pictures, tables and leaderboard pages of the documents again; needs OpenGL, and Vulkan for the viewer
+	@cd '$(ROOT)' && "$(PY)" docs/images/draw.py && "$(PY)" docs/images/viewer.py
 
 wheel: $(INSTALLED_DEV)  ## build the wheel into dist/
 	@cd '$(ROOT)' && "$(PY)" -m pip wheel --quiet --no-build-isolation --no-deps --wheel-dir dist .
@@ -60,9 +65,9 @@ clean:  ## remove build products and caches; .venv and runs stay
 define install
 	@"$(PY)" -c '$(OLD_ENOUGH)'
 	@"$(PY)" -m pip --version > /dev/null 2>&1 || "$(PY)" -m ensurepip
-	@echo 'installing surgsim into $(VENV)' >&2
-	@$(PIP_INSTALL) hatchling editables
-	@$(PIP_INSTALL) --no-build-isolation -e '$(1)'
+	@echo 'installing surgsim into $(VENV): about 1.3 GB, some minutes' >&2
+	@$(PIP_INSTALL) --quiet hatchling editables
+	@$(ALIVE) $(PIP_INSTALL) --no-build-isolation -e '$(1)' >&2
 	@rm -f '$(VENV)'/.surgsim-*
 endef
 
@@ -73,6 +78,10 @@ $(INSTALLED): | $(PY)
 $(INSTALLED_DEV): | $(PY)
 	$(call install,$(ROOT)[dev])
 	@touch '$(INSTALLED)' '$(INSTALLED_DEV)'
+
+$(INSTALLED_ALL): | $(PY)
+	$(call install,$(ROOT)[dev,gymnasium,pandas,ray])
+	@touch '$(INSTALLED)' '$(INSTALLED_DEV)' '$(INSTALLED_ALL)'
 
 $(PY):
 	@test -n '$(PYTHON)' || { echo 'surgsim needs Python 3.11 or newer, and none was found. Set PYTHON=/path/to/python3.11' >&2; exit 1; }

@@ -19,7 +19,7 @@ from pathlib import Path
 
 import numpy as np
 
-from surgsim.cli.output import print_table
+from surgsim.cli.table import print_table
 from surgsim.compare.engine import Batch, compare
 from surgsim.compare.job import Job
 from surgsim.compare.suite import SuiteConfig, check_runs, expand

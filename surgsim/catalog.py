@@ -12,12 +12,12 @@ import re
 import sys
 from dataclasses import dataclass, field
 from functools import cached_property
-from importlib.metadata import entry_points
 from typing import Annotated, Any, ClassVar, Literal, Union, get_args
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, create_model, model_validator
 
-from surgsim.errors import SurgsimError, unknown_name
+from surgsim.errors import SurgsimError, told, unknown_name
+from surgsim.plugins import Offer, offers
 
 
 class PartConfig(BaseModel):
@@ -52,9 +52,17 @@ class Catalog:
     _stand_ins: dict[str, type[PartConfig]] = field(default_factory=dict, init=False, repr=False)
 
     @cached_property
+    def _offers(self) -> dict[str, Offer]:
+        return {name: offer for name, offer in offers(self.group).items() if name not in self.places}
+
+    @cached_property
     def _all(self) -> dict[str, str]:
-        added = {point.name: point.value for point in entry_points(group=self.group)}
-        return {**added, **self.places}
+        return {**{name: offer.place for name, offer in self._offers.items()}, **self.places}
+
+    def _called(self, name: str) -> str:
+        """What messages call the part `name`, with the package that brings it."""
+        foreign = self._offers.get(name)
+        return f"{self.kind} '{name}'" + (f" {foreign.origin}" if foreign else "")
 
     def names(self) -> list[str]:
         """Names of all parts, sorted."""
@@ -74,10 +82,18 @@ class Catalog:
         except Exception as error:
             if name in self.places and not isinstance(error, ImportError | AttributeError):
                 raise  # a bug of ours
-            raise SurgsimError(f"{self.kind} '{name}' does not load: {_told(error)}") from error
+            raise SurgsimError(f"{self._called(name)} does not load: {told(error)}") from error
         if not (isinstance(found, type) and issubclass(found, PartConfig)):
-            raise SurgsimError(f"{self.kind} '{name}' ({self._all[name]}) is not a PartConfig class")
+            raise SurgsimError(f"{self._called(name)} ({self._all[name]}) is not a PartConfig class")
         return found
+
+    def loaded(self, name: str) -> type[PartConfig]:
+        """Config class of the part `name`, whose `type` is that name.
+
+        Raises:
+            SurgsimError: If there is none, it does not load, or its `type` is another.
+        """
+        return _checked(self.config(name), self._called(name), name)
 
     def usable(self, name: str) -> type[PartConfig]:
         """Config class of the part `name`, or a stand-in for a foreign one that does not load.
@@ -91,7 +107,7 @@ class Catalog:
             return self.config(name)
         if name not in self._stand_ins:
             try:
-                return _checked(self.config(name), self.kind, name)
+                return self.loaded(name)
             except SurgsimError as error:
                 self._stand_ins[name] = _stand_in(name, str(error))
                 if multiprocessing.parent_process() is None:  # workers need not say it again
@@ -110,11 +126,11 @@ class Catalog:
         return Annotated[Union[classes], Field(discriminator="type", title=self.kind)]  # noqa: UP007
 
 
-def _checked(config: type[PartConfig], kind: str, name: str) -> type[PartConfig]:
+def _checked(config: type[PartConfig], called: str, name: str) -> type[PartConfig]:
     """`config`, if its `type` is `name`: the union of a catalog's parts tells them apart by it."""
     key = config.model_fields.get("type")
     if key is None or get_args(key.annotation) != (name,):
-        raise SurgsimError(f"{kind} '{name}' ({config.__qualname__}) needs the field type: Literal['{name}']")
+        raise SurgsimError(f"{called} ({config.__qualname__}) needs the field type: Literal['{name}']")
     return config
 
 
@@ -133,9 +149,3 @@ def _stand_in(name: str, reason: str) -> type[PartConfig]:
     config = create_model("DoesNotLoad", __base__=_DoesNotLoad, __doc__=f"{reason}.", type=key)
     config.reason = reason
     return config
-
-
-def _told(error: Exception) -> str:
-    """What went wrong, on one line."""
-    text = " ".join(str(error).split())
-    return text if isinstance(error, ImportError | AttributeError) else f"{type(error).__name__}: {text}"

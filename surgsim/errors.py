@@ -10,7 +10,16 @@ from collections.abc import Iterable
 
 
 class SurgsimError(Exception):
-    """Something that the user can mend: bad input, a file that is damaged, a path out of reach."""
+    """Something that the user can mend: bad input, a file that is damaged, a path out of reach.
+
+    Example:
+        >>> import surgsim
+        >>> try:
+        ...     surgsim.load("circle_lwr4plus", seed=-1)
+        ... except surgsim.SurgsimError as error:
+        ...     print(error)
+        --seed: -1 is not allowed: must be 0 or more
+    """
 
 
 class ScenarioError(SurgsimError):
@@ -35,6 +44,22 @@ class RecordingError(SurgsimError):
     """A recording or run folder that is missing, damaged or not surgsim's."""
 
 
+class UnknownNameError(SurgsimError, KeyError):
+    """A column, metric or run that is asked for by a name that nothing has; a `KeyError` too."""
+
+    def __str__(self) -> str:
+        """The sentence as it is: a KeyError would put it in quotes."""
+        return str(self.args[0])
+
+
+def not_held(name: object, kind: str, known: Iterable[str], see: str) -> UnknownNameError:
+    """An error that says that `name` is not a `kind`, with the names most like it; `see` lists them all."""
+    shown = str(name)[:60]
+    near = difflib.get_close_matches(shown, list(known), n=3)
+    hint = f"Did you mean {' or '.join(map(repr, near))}?" if near else f"See {see}."
+    return UnknownNameError(f"'{shown}' is not a {kind}. {hint}")
+
+
 def unknown_name(name: str, kind: str, known: Iterable[str]) -> str:
     """Say that `name` is not a `kind`, list what is, and suggest the nearest match."""
     names = sorted(known)
@@ -42,6 +67,12 @@ def unknown_name(name: str, kind: str, known: Iterable[str]) -> str:
     text = f"'{shown}' is not a {kind}. Known: {', '.join(names) or 'none'}."
     near = difflib.get_close_matches(shown, names, n=1)
     return f"{text} Did you mean '{near[0]}'?" if near else text
+
+
+def told(error: BaseException) -> str:
+    """What went wrong in a part, on one line."""
+    text = " ".join(str(error).split())
+    return text if isinstance(error, ImportError | AttributeError) else f"{type(error).__name__}: {text}"
 
 
 class Outcome(enum.Enum):

@@ -2,13 +2,13 @@ import os
 import re
 import subprocess
 import sys
-from types import SimpleNamespace
 
 import pytest
 from pydantic import TypeAdapter, ValidationError
 
 from surgsim.catalog import Catalog, Name
 from surgsim.errors import SurgsimError
+from surgsim.plugins import Offer
 from surgsim.scenario.load import load_scenario
 from surgsim.tasks import TASKS
 from surgsim.tasks.circle import CircleConfig
@@ -16,6 +16,13 @@ from surgsim.tasks.circle import CircleConfig
 
 def _catalog(place: str) -> Catalog:
     return Catalog("widget", "surgsim.no_such_group", {"part": place})
+
+
+def _offers(**places: str) -> dict[str, Offer]:
+    return {
+        name: Offer(group="a group", name=name, place=place, package="lab", version="1.0")
+        for name, place in places.items()
+    }
 
 
 def test_a_name_gives_its_config_class():
@@ -42,12 +49,8 @@ def test_a_part_must_be_a_config(place):
 
 
 def test_parts_of_other_packages_come_from_entry_points_and_cannot_hide_ours(monkeypatch):
-    class Point:
-        def __init__(self, name: str, value: str) -> None:
-            self.name, self.value = name, value
-
-    points = [Point("theirs", "surgsim.tasks.circle:CircleConfig"), Point("part", "somewhere:Else")]
-    monkeypatch.setattr("surgsim.catalog.entry_points", lambda group: points)
+    given = _offers(theirs="surgsim.tasks.circle:CircleConfig", part="somewhere:Else")
+    monkeypatch.setattr("surgsim.catalog.offers", lambda group: given)
     catalog = _catalog("surgsim.tasks.spiral:SpiralConfig")
     assert catalog.names() == ["part", "theirs"]
     assert catalog.config("theirs") is CircleConfig
@@ -59,8 +62,7 @@ def foreign(monkeypatch):
     """A catalog with one part of ours and foreign ones at the given places."""
 
     def make(**places):
-        points = [SimpleNamespace(name=name, value=value) for name, value in places.items()]
-        monkeypatch.setattr("surgsim.catalog.entry_points", lambda group: points)
+        monkeypatch.setattr("surgsim.catalog.offers", lambda group: _offers(**places))
         return Catalog("widget", "a group", {"circle": "surgsim.tasks.circle:CircleConfig"})
 
     return make
@@ -70,7 +72,7 @@ BROKEN = {
     "no module": ("nowhere_at_all:Config", "No module named 'nowhere_at_all'"),
     "no class": ("surgsim.tasks.circle:Nothing", "has no attribute 'Nothing'"),
     "an error while it is imported": ("broken_part:Config", "ZeroDivisionError: division by zero"),
-    "no config": ("math:pi", "widget 'theirs' (math:pi) is not a PartConfig class"),
+    "no config": ("math:pi", "widget 'theirs' of the package lab 1.0 (math:pi) is not a PartConfig class"),
     "another type": ("surgsim.tasks.circle:CircleConfig", "needs the field type: Literal['theirs']"),
 }
 
@@ -89,7 +91,7 @@ def test_a_foreign_part_that_does_not_load_stops_only_what_names_it(
         assert reason in catalog.summary("theirs")
     out, error = capsys.readouterr()
     assert out == ""
-    assert error.startswith("surgsim: widget 'theirs' ")
+    assert error.startswith("surgsim: widget 'theirs' of the package lab 1.0 ")
     assert error.endswith("; no scenario can name it\n")
     assert error.count("\n") == 1, "it is said once"
     assert reason in error
@@ -118,7 +120,9 @@ def test_a_scenario_that_names_a_broken_part_is_refused_and_others_run(tmp_path)
         environment = {**os.environ, "PYTHONPATH": paths}
         return subprocess.run(command, env=environment, capture_output=True, text=True, timeout=100)
 
-    reason = "surgsim: resolver 'broken' does not load: No module named 'nowhere_at_all'"
+    reason = (
+        "surgsim: resolver 'broken' of the package theirs 1.0 does not load: No module named 'nowhere_at_all'"
+    )
     fine = check("circle_lwr4plus")
     assert (fine.returncode, fine.stderr) == (0, f"{reason}; no scenario can name it\n")
     setting = "controller.resolver={type: broken, gain: 3}"

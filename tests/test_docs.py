@@ -33,6 +33,7 @@ from surgsim.scenario.schema import (
     StartConfig,
     StopConfig,
 )
+from surgsim.scenario.thresholds import Threshold, ThresholdsConfig
 from surgsim.scenario.yaml_text import parse_yaml
 from surgsim.simulate.loop import simulate
 from surgsim.simulate.setup import prepare
@@ -133,6 +134,8 @@ def sections():
         "simulation": SimulationConfig,
         "safety": SafetyConfig,
         "safety: stop": StopConfig,
+        "thresholds": ThresholdsConfig,
+        "thresholds: threshold": Threshold,
         "recording": RecordingConfig,
         "controller": ControllerConfig,
     }
@@ -215,6 +218,14 @@ def test_ci_runs_the_commands_of_the_readme():
     for target in ("test", "check"):
         assert re.search(rf"^make .*\b{target}$", script.read_text(), re.M)
         assert f"make {target}" in text_of("README.md")
+
+
+def test_ci_installs_every_extra_and_leaves_no_test_out():
+    makefile, script = text_of("Makefile"), text_of(".ci/run")
+    (extras,) = re.findall(r"install,\$\(ROOT\)\[([\w,]+,[\w,]+)\]", makefile)
+    assert sorted(extras.split(",")) == sorted(PROJECT["project"]["optional-dependencies"])
+    assert "install-all\n" in script
+    assert "PYTEST_ARGS=--no-skips test\n" in script
 
 
 PATHS = ("circle", "sinusoid", "spiral")

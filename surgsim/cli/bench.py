@@ -22,7 +22,8 @@ def execute(options: argparse.Namespace) -> int:
     """Print real-time factors of every shipped controller on the circle."""
     import json
 
-    from surgsim.cli.output import format_number, print_table
+    from surgsim.cli.output import format_number
+    from surgsim.cli.table import print_table
     from surgsim.runs.bench import bench
 
     rows = bench(options.duration, options.repeat)

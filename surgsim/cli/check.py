@@ -25,6 +25,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def execute(options: argparse.Namespace) -> int:
     """Check every scenario; 2 if any is wrong."""
     from surgsim.cli.main import print_error
+    from surgsim.cli.table import print_text
     from surgsim.errors import SurgsimError
     from surgsim.scenario.load import load_scenario
     from surgsim.scenario.yaml_text import dump_yaml
@@ -42,6 +43,8 @@ def execute(options: argparse.Namespace) -> int:
             wrong += 1
             continue
         if not options.quiet:
-            print(f"# {name}: ok, {setup.task.duration_s:g} s; sha256 {scenario.sha256()}")
-            print(dump_yaml(scenario.resolved()), end="" if len(options.scenarios) == 1 else "---\n")
+            print(f"# {name}: ok, {setup.task.duration_s:g} s")
+            print(f"# sha256 {scenario.sha256()}")
+            print_text(dump_yaml(scenario.resolved()))
+            print("---\n" if len(options.scenarios) > 1 else "", end="")
     return 2 if wrong else 0

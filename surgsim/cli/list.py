@@ -18,6 +18,8 @@ KINDS = (
     "resolvers",
     "torque-laws",
     "port-estimators",
+    "policies",
+    "plants",
     "disturbances",
     "props",
     "metrics",
@@ -32,7 +34,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def execute(options: argparse.Namespace) -> int:
     """Print the names with a line about each."""
-    from surgsim.cli.output import print_table
+    from surgsim.cli.table import print_table
 
     items = _items(options.kind)
     if options.json:
@@ -46,9 +48,13 @@ def _items(kind: str) -> list[tuple[str, str]]:
     if kind in ("scenarios", "suites", "controllers"):
         return _files(kind)
     if kind == "robots":
-        from surgsim.models.robot import robot_names
+        from surgsim.models.robot import robot_description, robot_names
 
-        return [(name, "") for name in robot_names()]
+        return [(name, robot_description(name)) for name in robot_names()]
+    if kind == "policies":
+        from surgsim.control.policies.registry import policy_names, policy_summary
+
+        return [(name, policy_summary(name)) for name in policy_names()]
     if kind == "metrics":
         from surgsim.metrics.catalog import METRICS
 
@@ -56,6 +62,7 @@ def _items(kind: str) -> list[tuple[str, str]]:
     from surgsim.control.port_estimators import PORT_ESTIMATORS
     from surgsim.control.resolvers import RESOLVERS
     from surgsim.control.torque_laws import TORQUE_LAWS
+    from surgsim.plant import PLANTS
     from surgsim.plant.disturbances import DISTURBANCES
     from surgsim.plant.props import PROPS
     from surgsim.tasks import TASKS
@@ -65,6 +72,7 @@ def _items(kind: str) -> list[tuple[str, str]]:
         "resolvers": RESOLVERS,
         "torque-laws": TORQUE_LAWS,
         "port-estimators": PORT_ESTIMATORS,
+        "plants": PLANTS,
         "disturbances": DISTURBANCES,
         "props": PROPS,
     }
@@ -73,8 +81,8 @@ def _items(kind: str) -> list[tuple[str, str]]:
 
 
 def _files(kind: str) -> list[tuple[str, str]]:
-    from surgsim.scenario.load import shipped
+    from surgsim.scenario.load import shipped, shipped_safety
     from surgsim.scenario.yaml_text import read_yaml
 
-    files = shipped("" if kind == "scenarios" else kind)
+    files = shipped(kind) if kind != "scenarios" else {**shipped(), **shipped_safety()}
     return [(name, str(read_yaml(path).tree.get("description", ""))) for name, path in files.items()]

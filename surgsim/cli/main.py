@@ -1,7 +1,7 @@
 """Entry point: parses the command line and runs one command.
 
 Exit status: 0 done; 1 the run ended with an outcome other than completed, or figures differ; 2 the user's
-input is wrong.
+input is wrong; 128 and the signal's number if one ended the command (Ctrl-C 130, SIGTERM 143).
 """
 
 import argparse
@@ -11,38 +11,52 @@ import sys
 from collections.abc import Sequence
 
 from surgsim import __version__
+from surgsim.cli.kernels import compiling_shown
+from surgsim.cli.parser import Parser
+from surgsim.cli.table import print_prose
 from surgsim.errors import SurgsimError
+from surgsim.runs.stop import Stopped, stopping_in_order
 
-COMMANDS = ("run", "check", "list", "compare", "report", "inspect", "reproduce", "bench")
+COMMANDS = (
+    "run",
+    "check",
+    "list",
+    "compare",
+    "report",
+    "inspect",
+    "reproduce",
+    "bench",
+    "test-part",
+    "completion",
+)
 _LONGEST_ERROR = 1000
 _EPILOG = """examples:
-  surgsim run circle_lwr4plus                      run a shipped scenario, write its folder below runs/
-  surgsim run my.yaml --set task.radius_m=0.03     run your own, with one value changed
-  surgsim check my.yaml                            say what is wrong with it, or print it with every default
-  surgsim list controllers                         what can be named in a scenario
-  surgsim compare quick                            a suite of scenarios, controllers and seeds
+  surgsim run circle_lwr4plus          run a shipped scenario
+  surgsim run my.yaml --set task.radius_m=0.03
+                                       run your own, with one value changed
+  surgsim check my.yaml                say what is wrong with it
+  surgsim list controllers             what can be named in a scenario
+  surgsim compare quick                scenarios, controllers and seeds
   surgsim inspect runs/circle_lwr4plus/vprnn-seed0 --view
 """
 
 
 def build_parser() -> argparse.ArgumentParser:
     """The whole command line; imports nothing heavy."""
-    parser = argparse.ArgumentParser(
+    parser = Parser(
         prog="surgsim",
         description="Benchmark for controllers that move a surgical instrument through a trocar.",
         epilog=_EPILOG,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("--version", action="version", version=f"surgsim {__version__}")
     commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
     for name in COMMANDS:
-        module = importlib.import_module(f"surgsim.cli.{name}")
+        module = importlib.import_module(f"surgsim.cli.{name.replace('-', '_')}")
         sub = commands.add_parser(
             name,
             help=module.HELP,
             description=module.HELP[0].upper() + module.HELP[1:] + ".",
             epilog=module.EXAMPLES,
-            formatter_class=argparse.RawDescriptionHelpFormatter,
         )
         module.add_arguments(sub)
         sub.set_defaults(execute=module.execute)
@@ -50,23 +64,27 @@ def build_parser() -> argparse.ArgumentParser:
 
 
 def print_error(error: SurgsimError) -> None:
-    """Print what the user can mend on one line of stderr, whatever the names in it."""
+    """Print what the user can mend on one line of stderr, whatever the names in it.
+
+    A terminal breaks it between words.
+    """
     from surgsim.scenario.wording import one_line
 
-    print(f"surgsim: {one_line(str(error), _LONGEST_ERROR)}", file=sys.stderr)
+    print_prose(f"surgsim: {one_line(str(error), _LONGEST_ERROR)}", sys.stderr)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command and return its exit status."""
     try:
-        options = build_parser().parse_args(arguments)
-        return int(options.execute(options))
+        with stopping_in_order(), compiling_shown():
+            options = build_parser().parse_args(arguments)
+            return int(options.execute(options))
     except SurgsimError as error:
         print_error(error)
         return 2
-    except KeyboardInterrupt:
-        print("surgsim: interrupted, nothing was written", file=sys.stderr)
-        return 130
+    except Stopped as stopped:
+        print(f"surgsim: {stopped.told}; nothing half done is left", file=sys.stderr)
+        return stopped.exit_status
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0

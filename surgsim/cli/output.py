@@ -8,9 +8,12 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
-from rich.table import Table
+from rich.progress import BarColumn, Progress, ProgressColumn, Task, TextColumn, TimeRemainingColumn
+from rich.text import Text
 
+from surgsim.cli.kernels import on_screen
+from surgsim.cli.table import fit_prose, print_prose, print_table, terminal_width
+from surgsim.compiled.watch import working_time
 from surgsim.simulate.loop import Progress as ProgressCall
 
 if TYPE_CHECKING:
@@ -30,29 +33,15 @@ def format_number(value: float | None, digits: int = 4) -> str:
     return f"{value:.{digits - 1}e}"
 
 
-_ENOUGH = 10_000  # columns
-
-
-def print_table(
-    title: str,
-    header: Sequence[str],
-    rows: Sequence[Sequence[str]],
-    right: Sequence[int] = (),
-    *,
-    whole: bool = False,
-) -> None:
-    """Print a table, the columns in `right` right-aligned; a `whole` one may be wider than the terminal."""
-    table = Table(title=title, title_justify="left", box=None, pad_edge=False, header_style="bold")
-    for index, name in enumerate(header):
-        table.add_column(name, justify="right" if index in right else "left", no_wrap=whole or index in right)
-    for row in rows:
-        table.add_row(*row)
-    width = None if sys.stdout.isatty() else 110
-    console = Console(width=width, highlight=False)
-    if whole:
-        needed = Console(width=_ENOUGH).measure(table).maximum
-        console = Console(width=max(console.width, needed), highlight=False)
-    console.print(table)
+def print_paragraphs(lines: Sequence[str]) -> None:
+    """Print lines, broken between words, and an empty one after them; what goes on is indented further."""
+    width = min(80, terminal_width(sys.stdout))
+    for line in lines:
+        text = line.lstrip()
+        indent = " " * (len(line) - len(text))
+        first, *others = fit_prose(text, width - len(indent) - 2)
+        print("\n".join([indent + first, *(f"{indent}  {other}" for other in others)]))
+    print()
 
 
 def print_metrics(title: str, metrics: Mapping[str, float | None]) -> None:
@@ -70,11 +59,15 @@ def print_metrics(title: str, metrics: Mapping[str, float | None]) -> None:
 
 
 def print_run(trace: "Trace", metrics: Mapping[str, float | None]) -> None:
-    """Print a run's metrics, and how it ended."""
+    """Print a run's metrics, whether its task was done, and how it ended."""
+    from surgsim.verdict import judge
+
     scenario, ending = trace.meta.scenario, trace.meta.ending
     print_metrics(f"{scenario['name']}, {scenario['controller']['name']}, seed {scenario['seed']}", metrics)
     detail = f" {ending.detail}." if ending.detail else ""
-    print(f"\n{ending.outcome.name.lower()} at {ending.t_s:.3f} s: {ending.outcome.value}{detail}")
+    print()
+    print_prose(judge(trace, metrics).line())
+    print_prose(f"{ending.outcome.name.lower()} at {ending.t_s:.3f} s: {ending.outcome.value}{detail}")
 
 
 @contextmanager
@@ -88,22 +81,38 @@ def show_progress(label: str, quiet: bool = False) -> Iterator[ProgressCall | No
         yield _Lines(label)
 
 
+_BAR = 16  # columns
+_BESIDE = _BAR + len(" 100.0/100.0 s  10.0x real time 0:00:00 ")
+
+
+class _Description(ProgressColumn):
+    """What is going on, cut where there is no room for it beside the bar and its figures."""
+
+    def render(self, task: Task) -> Text:
+        """Its text for the width of the terminal."""
+        text = Text(task.description, no_wrap=True)
+        text.truncate(max(1, terminal_width(sys.stderr) - _BESIDE), overflow="ellipsis")
+        return text
+
+
 def _bar(label: str) -> Iterator[ProgressCall]:
     columns = (
-        TextColumn("{task.description}"),
-        BarColumn(),
-        TextColumn("{task.completed:.1f}/{task.total:.1f} s  {task.fields[factor]}"),
+        _Description(),
+        BarColumn(_BAR),
+        TextColumn("{task.fields[reached]}"),
         TimeRemainingColumn(),
     )
-    began = time.perf_counter()
+    began = working_time()
     with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task(label, total=1.0, factor="")
+        task = bar.add_task(label, total=None, reached="")
 
         def update(reached_s: float, duration_s: float) -> None:
-            factor = reached_s / max(time.perf_counter() - began, 1e-9)
-            bar.update(task, completed=reached_s, total=duration_s, factor=f"{factor:.1f}x real time")
+            factor = f"{reached_s / max(working_time() - began, 1e-9):.1f}x real time"
+            reached = f"{reached_s:.1f}/{duration_s:.1f} s  {factor}"
+            bar.update(task, description=label, completed=reached_s, total=duration_s, reached=reached)
 
-        yield update
+        with on_screen(lambda text: bar.update(task, description=text)):
+            yield update
 
 
 class _Lines:
@@ -111,10 +120,10 @@ class _Lines:
 
     def __init__(self, label: str) -> None:
         self._label = label
-        self._began = self._last = time.perf_counter()
+        self._began = self._last = working_time()
 
     def __call__(self, reached_s: float, duration_s: float) -> None:
-        now = time.perf_counter()
+        now = working_time()
         if now - self._last >= 5.0:
             self._last = now
             factor = reached_s / (now - self._began)
@@ -133,21 +142,23 @@ def show_batch_progress(label: str) -> Iterator[Callable[[int, int, str], None]]
 
 def _batch_bar(label: str) -> Iterator[Callable[[int, int, str], None]]:
     columns = (
-        TextColumn("{task.description}"),
-        BarColumn(),
-        TextColumn("{task.completed:.0f}/{task.total:.0f} runs  {task.fields[failed]}"),
+        _Description(),
+        BarColumn(_BAR),
+        TextColumn("{task.fields[reached]}"),
         TimeRemainingColumn(),
     )
     failed = 0
     with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task(label, total=None, failed="")
+        task = bar.add_task(label, total=None, reached="")
 
         def update(done: int, total: int, outcome: str) -> None:
             nonlocal failed
             failed += outcome != "completed"
-            bar.update(task, completed=done, total=total, failed=f"{failed} failed" if failed else "")
+            reached = f"{done}/{total} runs" + (f"  {failed} failed" if failed else "")
+            bar.update(task, description=label, completed=done, total=total, reached=reached)
 
-        yield update
+        with on_screen(lambda text: bar.update(task, description=text)):
+            yield update
 
 
 class _BatchLines:
@@ -181,13 +192,18 @@ def print_leaderboard(metric: str, rows: "Sequence[LeaderboardRow]", points: int
             return format_number(figure.value)
         return f"{format_number(figure.value)} [{format_number(figure.low)}, {format_number(figure.high)}]"
 
-    def failures(row: "LeaderboardRow") -> str:
-        return ", ".join(f"{count} {name}" for name, count in row.failures.items()) or "none"
+    from surgsim.compare.failures import counted_outcomes
+    from surgsim.metrics.catalog import METRICS
 
-    table = [
-        (row.controller, str(row.runs), failures(row), interval(row.value), interval(row.rank))
-        for row in rows
-    ]
-    header = ("controller", "runs", "failed", f"{metric} (IQM, 95 %)", "mean rank (95 %)")
+    def cells(row: "LeaderboardRow") -> tuple[str, ...]:
+        undone = f"{row.not_done} not done" if row.not_done else ""
+        failed = ", ".join(filter(None, (counted_outcomes(row.failures), undone))) or "none"
+        place = str(row.place or "-")
+        rank = format_number(row.rank.value, 3)
+        return (place, row.controller, failed, str(row.runs), interval(row.value), rank)
+
+    table = [cells(row) for row in rows]
+    header = ("place", "controller", "failed", "runs", "IQM [95 %]", "mean rank")
     pooled = f", all {points} points of the grid pooled" if points > 1 else ""
-    print_table(f"{metric}, best mean rank first{pooled}", header, table, right=(1, 3, 4))
+    title = f"{METRICS[metric].heading}; who is not told apart shares a place{pooled}"
+    print_table(title, header, table, right=(0, 3, 4, 5))

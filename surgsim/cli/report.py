@@ -11,6 +11,7 @@ links lead to the runs' folders and recordings, relative to where the page is.
 examples:
   surgsim report runs/suites/quick
   surgsim report runs/suites/quick --out quick.html
+  surgsim report runs/suites/quick --matters rcm_error_rms_mm=0.5
 """
 
 
@@ -20,6 +21,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--out", type=path_argument, metavar="FILE", help="file to write; default DIR/report.html"
     )
+    parser.add_argument(
+        "--matters",
+        action="append",
+        default=[],
+        metavar="METRIC=VALUE",
+        help="smallest difference that matters",
+    )
     parser.add_argument("--json", action="store_true", help="print JSON")
 
 
@@ -28,9 +36,11 @@ def execute(options: argparse.Namespace) -> int:
     import json
     import sys
 
+    from surgsim.compare.matters import parse_matters
     from surgsim.report.write import write_report
 
-    file = write_report(options.folder, options.out, lambda text: print(text, file=sys.stderr))
+    matters = parse_matters(options.matters)
+    file = write_report(options.folder, options.out, lambda text: print(text, file=sys.stderr), matters)
     size = file.stat().st_size
     if options.json:
         print(json.dumps({"report": str(file), "bytes": size}))

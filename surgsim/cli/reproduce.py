@@ -17,7 +17,7 @@ appears when the study is whole. A claim that does not hold is a result, not an 
 examples:
   surgsim reproduce manipulability_validation
   surgsim reproduce manipulability_validation --quick --out /tmp/sample
-  surgsim reproduce manipulability_validation --json | jq '.claims[] | select(.verdict != "holds")'
+  surgsim reproduce manipulability_validation --json | jq .claims
 """
 
 
@@ -84,7 +84,7 @@ def _print_json(study: str, result: "StudyResult") -> None:
 
 
 def _print(study: str, result: "StudyResult") -> None:
-    from surgsim.cli.output import print_table
+    from surgsim.cli.table import print_table
     from surgsim.studies.study import format_cell
 
     name, rows = next(iter(result.tables.items()))

@@ -16,7 +16,7 @@ metrics.json and recording.rrd. It appears when the run is whole.
 examples:
   surgsim run circle_lwr4plus
   surgsim run circle_lwr4plus --controller vprnn --seed 3 --out runs/mine
-  surgsim run circle_lwr4plus --set task.radius_m=0.03 --set trocar.position_m='[0, 0.55, 0.2]'
+  surgsim run circle_lwr4plus --set trocar.position_m='[0, 0.55, 0.2]'
   surgsim run peg_and_ring_panda --operator keyboard
   surgsim run my_scenario.yaml --json | jq .metrics.rcm_error_max_mm
 """
@@ -39,6 +39,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def execute(options: argparse.Namespace) -> int:
     """Run the scenario; 0 when it completed."""
     from surgsim.cli.output import print_run, show_progress
+    from surgsim.cli.table import print_prose
     from surgsim.errors import Outcome, UnreachableError
     from surgsim.runs.folder import run_to_folder
     from surgsim.scenario.load import load_scenario
@@ -65,7 +66,7 @@ def execute(options: argparse.Namespace) -> int:
     else:
         print_run(result.trace, result.metrics)
     speed = f"{result.wall_time_s:.1f} s, {result.real_time_factor:.1f}x real time"
-    print(f"simulated {ending.t_s:.1f} s in {speed}; wrote {folder}", file=sys.stderr)
+    print_prose(f"simulated {ending.t_s:.1f} s in {speed}; wrote {folder}", sys.stderr)
     return 0 if ending.outcome is Outcome.COMPLETED else 1
 
 

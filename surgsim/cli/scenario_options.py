@@ -8,15 +8,20 @@ from surgsim.errors import ScenarioError, SurgsimError
 def add_scenario_options(parser: argparse.ArgumentParser) -> None:
     """`--controller`, `--set` and `--seed`."""
     parser.add_argument("--controller", metavar="NAME", help="controller instead of the scenario's own")
+    add_settings(parser, "change one value; may be given again")
+    parser.add_argument("--seed", type=int, metavar="N", help="seed instead of the scenario's own")
+
+
+def add_settings(parser: argparse.ArgumentParser, text: str) -> None:
+    """`--set`."""
     parser.add_argument(
         "--set",
         action="append",
         default=[],
         metavar="KEY.PATH=VALUE",
         dest="assignments",
-        help="change one value; may be given again",
+        help=text,
     )
-    parser.add_argument("--seed", type=int, metavar="N", help="seed instead of the scenario's own")
 
 
 def naming_file(name: str, error: SurgsimError) -> SurgsimError:

@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import stats
+from numpy.typing import NDArray
 
 from surgsim.compare.intervals import (
     NOTHING,
@@ -27,30 +27,33 @@ from surgsim.compare.observations import Array, Observations, Texts, metric_name
 def scores(runs: Observations, metric: str) -> Array:
     """Scores (n,): 1 is the typical run of the setting's best controller, larger is worse.
 
-    A setting is a scenario and a grid point; its reference r is the best of the controllers' medians. Where
-    all values of the metric are positive the score is x/r (r/x if more is better), otherwise 1 + |x - r|/d,
-    signed so that larger is worse, with d the setting's interquartile range. NaN for a failed run.
+    A setting is a scenario and a grid point; its reference r is the best of the controllers' medians. A value
+    that differs from r by less than m, the smallest difference that matters, scores 1. Where all values of
+    the metric are positive the others score x/max(r, m) (r/x if more is better), otherwise 1 + |x - r|/d,
+    signed so that larger is worse, with d the larger of m and the setting's interquartile range. NaN for a
+    failed run.
     """
     values, lower = runs.values(metric), metric_named(metric).lower_is_better
     ratio = bool(np.nanmin(values) > 0.0) if np.isfinite(values).any() else True
-    found = np.full(len(runs), np.nan)
+    found, matters = np.full(len(runs), np.nan), runs.matters(metric)
     settings = _groups(runs.scenario, runs.parameters)
     for rows in settings.values():
         medians = _medians(values[rows], runs.controller[rows])
         if medians.size:
             best = float(medians.max() if lower is False else medians.min())
-            found[rows] = _score(values[rows], best, lower is not False, ratio)
+            scored = _score(values[rows], best, lower is not False, ratio, matters)
+            found[rows] = np.where(np.abs(values[rows] - best) < matters, 1.0, scored)
     return found
 
 
-def _score(values: Array, best: float, lower_is_better: bool, ratio: bool) -> Array:
+def _score(values: Array, best: float, lower_is_better: bool, ratio: bool, matters: float) -> Array:
     if ratio:
-        return values / best if lower_is_better else best / values
+        return values / max(best, matters) if lower_is_better else best / values
     spread = float(np.subtract(*np.nanpercentile(values, [75, 25]))) or float(
         np.nanmax(values) - np.nanmin(values)
     )
     worse = values - best if lower_is_better else best - values
-    return np.asarray(1.0 + worse / (spread or 1.0))
+    return np.asarray(1.0 + worse / (max(spread, matters) or 1.0))
 
 
 def _medians(values: Array, controllers: Texts) -> Array:
@@ -123,19 +126,31 @@ def _constant(stratum: Array) -> bool:
 def ranks(runs: Observations, metric: str) -> Array:
     """Rank of each run among the controllers at its scenario, grid point and seed (n,); 1 is best.
 
-    Ties share their mean rank; failed runs share the last. NaN where a controller is missing or a completed
-    run has no value, because ranks among fewer mean something else.
+    A task done comes before one that is not, and that before a failure. Within the same, a value is better
+    if it is so by the smallest difference that matters. The rank is one, plus the better ones, plus half of
+    the ties: with exact ties alone, their mean rank. NaN where a controller is missing or a completed run has
+    no value, because ranks among fewer mean something else.
     """
     lower = metric_named(metric).lower_is_better
-    values, completed = runs.values(metric), runs.completed
-    size = len(runs.controllers)
+    values, completed, standing = runs.values(metric), runs.completed, runs.standing
+    size, matters = len(runs.controllers), runs.matters(metric)
     found = np.full(len(runs), np.nan)
     for rows in _groups(runs.scenario, runs.parameters, [str(seed) for seed in runs.seed]).values():
         whole = len(rows) == size and np.isfinite(values[rows])[completed[rows]].all()
         if whole and completed[rows].any():
             oriented = values[rows] if lower is not False else -values[rows]
-            found[rows] = stats.rankdata(np.where(completed[rows], oriented, np.inf))
+            found[rows] = _ranks(np.where(completed[rows], oriented, 0.0), standing[rows], matters)
     return found
+
+
+def _ranks(values: Array, standing: NDArray[np.int64], matters: float) -> Array:
+    """Ranks of runs that differ in the controller (n,), the less the better."""
+    less = values[:, None] - values[None, :]
+    lead = standing[:, None] - standing[None, :]
+    ahead = (lead > 0) | ((lead == 0) & (less < 0.0) & (less <= -matters))  # [i, j]: i before j
+    before = ahead.sum(axis=0)
+    ties = len(values) - 1 - before - ahead.sum(axis=1)
+    return np.asarray(1.0 + before + 0.5 * ties)
 
 
 def _mean(samples: Array) -> Array:

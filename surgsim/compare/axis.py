@@ -50,11 +50,12 @@ class AxisConfig(PartConfig):
                 raise ValueError(f"{key} has {len(values)} values for {len(self.levels)} levels")
         if self.key is None and not any(groups):
             raise ValueError("an axis needs key, values or controllers: its levels set nothing")
-        if any(key.strip() == "seed" for key in self._keys()):
+        if any(key.strip() == "seed" for key in self.touched_keys()):
             raise ValueError("seed cannot be on an axis: the seeds of a suite are its key seeds")
         return self
 
-    def _keys(self) -> list[str]:
+    def touched_keys(self) -> list[str]:
+        """Every key path that a level sets, for any controller."""
         keys = [key for group in (self.values, *self.controllers.values()) for key in group]
         keys += [setting.partition("=")[0] for setting in self.settings]
         return [*keys, self.key] if self.key is not None else keys

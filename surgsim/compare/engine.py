@@ -2,9 +2,7 @@
 
 import hashlib
 import json
-import os
-import shutil
-import tempfile
+import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,15 +16,18 @@ from surgsim.compare.suite import RunSpec, SuiteConfig, check_runs, expand
 from surgsim.compare.table import Row, write_table
 from surgsim.compare.workers import Done, run_jobs
 from surgsim.errors import SurgsimError
+from surgsim.recording.contents import fault_of
+from surgsim.recording.files import replacing, write_file
+from surgsim.recording.folders import make_folder
 from surgsim.recording.sealed import read_sealed, sealed
-from surgsim.runs.provenance import provenance
+from surgsim.runs.drafts import clear_drafts
+from surgsim.runs.exchange import restore_all
+from surgsim.runs.provenance import code_difference, provenance, provenance_of
 from surgsim.scenario.schema import Scenario
 
 Report = Callable[[int, int, str], None]
 """Called with the runs that are done, all runs, and the last one's outcome."""
 Runner = Callable[[Sequence[Job], int], Iterator[Done]]
-Code = tuple[str, str | None]
-"""Version and commit of surgsim."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -68,17 +69,17 @@ def compare(batch: Batch, report: Report | None = None, runner: Runner = run_job
     _prepare(batch)
     everything = list(zip(rows, scenarios, specs, strict=True))
     i, n = batch.shard
-    code = _code(provenance())
-    missing = [
-        (row, scenario, spec)
-        for row, scenario, spec in everything[i - 1 :: n]
-        if not is_whole(batch.out / row.folder, scenario, spec.record, code)
-    ]
+    ours = everything[i - 1 :: n]
+    others: list[str] = []
     jobs = [
         Job(scenario_json=scenario.model_dump_json(), folder=str(batch.out / row.folder), record=spec.record)
-        for row, scenario, spec in missing
+        for row, scenario, spec in ours
+        if not _is_to_be_kept(batch.out / row.folder, scenario, spec.record, others)
     ]
-    count = len(everything[i - 1 :: n])
+    count = len(ours)
+    if others:
+        told = f"{len(others)} of {count} runs were made by other code ({others[0]}) and are run again"
+        print(f"surgsim: {told}", file=sys.stderr)
     for done, result in enumerate(runner(jobs, batch.jobs), start=count - len(jobs) + 1):
         if report is not None:
             report(done, count, result.outcome)
@@ -87,23 +88,39 @@ def compare(batch: Batch, report: Report | None = None, runner: Runner = run_job
     return write_table(batch.out, rows)
 
 
-def is_whole(folder: Path, scenario: Scenario, record: bool, code: Code | None = None) -> bool:
+def _is_to_be_kept(folder: Path, scenario: Scenario, record: bool, others: list[str]) -> bool:
+    """Whether `folder` holds the run, made by this code; if by other code, `others` gets the difference."""
+    summary = _whole(folder, scenario, record)
+    if summary is None:
+        return False
+    old, new = summary["provenance"], provenance_of(scenario)
+    try:
+        same = bool(old["code_sha256"] == new["code_sha256"])
+        difference = "" if same else code_difference(old, new) or "of another version"
+    except (KeyError, TypeError, AttributeError):
+        same, difference = False, "of another version"
+    if not same:
+        others.append(difference)
+    return same
+
+
+def is_whole(folder: Path, scenario: Scenario, record: bool) -> bool:
     """Whether `folder` holds the run of exactly this scenario, with its recording if one is wanted.
 
-    With `code`, the run must also have been made by it.
+    Every file of it must be as it was written.
     """
+    return _whole(folder, scenario, record) is not None
+
+
+def _whole(folder: Path, scenario: Scenario, record: bool) -> dict[str, Any] | None:
+    """The summary of the run that `folder` holds, if it is whole."""
     try:
         summary = read_sealed(folder / "metrics.json")
-        same = code is None or _code(summary["provenance"]) == code
-        same = same and summary["provenance"]["scenario_sha256"] == scenario.sha256()
-        recorded = not record or not summary["metrics"] or (folder / "recording.rrd").is_file()
+        same = summary["provenance"]["scenario_sha256"] == scenario.sha256()
+        recorded = not record or not summary["metrics"] or "recording.rrd" in summary["files"]
+        return summary if same and recorded and not fault_of(folder, summary) else None
     except (OSError, ValueError, KeyError, TypeError):
-        return False
-    return bool(same and recorded)
-
-
-def _code(origin: Mapping[str, Any]) -> Code:
-    return (origin["surgsim"], origin["commit"])
+        return None
 
 
 def _row(suite: SuiteConfig, spec: RunSpec, scenario: Scenario) -> Row:
@@ -143,17 +160,14 @@ def _prepare(batch: Batch) -> None:
         "settings": list(batch.suite.settings),
     }
     try:
-        out.mkdir(parents=True, exist_ok=True)
+        make_folder(out)
         if any(not path.name.startswith(_DRAFT) for path in out.iterdir()):
             _check_old(batch, about)
-        if batch.shard[1] == 1:  # other shards may be writing now
-            _clear(out)
-        whole = sealed({**about, "command": batch.command, "provenance": provenance()})
-        handle, draft = tempfile.mkstemp(prefix=_DRAFT, suffix=".part", dir=out)
-        with os.fdopen(handle, "w") as stream:
-            stream.write(json.dumps(whole, indent=2) + "\n")
-        os.chmod(draft, 0o644)
-        os.replace(draft, file)
+        _clear(out)
+        told = {"matters": batch.suite.matters, "command": batch.command, "provenance": provenance()}
+        whole = sealed({**about, **told})
+        with replacing(file) as draft:
+            write_file(draft, json.dumps(whole, indent=2) + "\n")
     except OSError as error:
         raise SurgsimError(f"cannot write {out}: {error.strerror or error}") from error
 
@@ -182,8 +196,7 @@ def _check_old(batch: Batch, about: Mapping[str, Any]) -> None:
 
 
 def _clear(out: Path) -> None:
-    """Remove what killed runs left half done."""
-    for left in [*out.glob("runs/*/*/.*.part"), *out.glob("runs/*/*/.*.old")]:
-        shutil.rmtree(left, ignore_errors=True)
-    for left in [*out.glob(f"{_DRAFT}*.part"), *out.glob(".runs.*.partial")]:
-        left.unlink(missing_ok=True)
+    """Remove what killed runs left half done; bring back what one had set aside."""
+    for parent in out.glob("runs/*/*"):
+        clear_drafts(parent)
+        restore_all(parent)

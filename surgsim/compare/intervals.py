@@ -74,7 +74,8 @@ def too_few(sizes: Sequence[int]) -> str:
     if max(sizes) == 1:
         return ONE_SEED
     if n < FEWEST:
-        return f"only {n} seeds: no interval"
+        over = f" over {len(sizes)} scenarios" if len(sizes) > 1 else ""
+        return f"only {n} seeds{over}: no interval"
     return "a scenario has only one seed: no interval" if min(sizes) < 2 else ""
 
 
@@ -156,9 +157,9 @@ def percentile(figures: Array, sizes: Sequence[int]) -> tuple[float, float]:
     return float(low), float(high)
 
 
-def proportion_interval(share: float, n: int) -> Interval:
-    """A share of `n` and its Wilson interval, which has a width at 0 and 1 too."""
-    note = too_few([n])
+def proportion_interval(share: float, sizes: Sequence[int]) -> Interval:
+    """A share of strata of these `sizes`, and its Wilson interval, which has a width at 0 and 1 too."""
+    n, note = sum(sizes), too_few(sizes)
     if note:
         return Interval(value=share if n else None, n=n, note=note)
     z = float(stats.norm.ppf((1 + LEVEL) / 2))

@@ -3,10 +3,12 @@
 import traceback
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from surgsim.errors import Outcome, SurgsimError
 from surgsim.runs.folder import execute, summary_of, whole_folder, write_run, write_summary
 from surgsim.scenario.schema import Scenario
+from surgsim.verdict import unfinished
 
 REFUSED = "refused"
 WORKER_DIED = "worker_died"
@@ -82,7 +84,7 @@ def write_failure(scenario: Scenario, folder: Path, name: str, detail: str) -> N
     outcome = {"name": name, "sentence": _SENTENCES[name], "t_s": 0.0, "detail": detail, "data": {}}
     try:
         with whole_folder(folder) as draft:
-            write_summary(draft, scenario, summary_of(scenario, outcome, {}, 0.0))
+            write_summary(draft, scenario, summary_of(scenario, outcome, unfinished(name), {}, 0.0))
     except SurgsimError as error:
         raise DiskError(str(error)) from error
 
@@ -92,5 +94,13 @@ _SENTENCES = {
     WORKER_DIED: "The process that ran it died at every try.",
     CRASHED: "The run raised an error inside surgsim: a bug.",
 }
+BROKEN = frozenset({WORKER_DIED, CRASHED})
+"""Ways of ending that are faults of surgsim or the machine, not results."""
 OUTCOMES = frozenset({*(outcome.name.lower() for outcome in Outcome), *_SENTENCES})
 """Every way in which a run of a batch can end."""
+
+
+def broken(table: Any) -> list[str]:
+    """Ids of the runs in a batch's table that crashed or whose worker died."""
+    pairs = zip(table["run_id"].to_pylist(), table["outcome"].to_pylist(), strict=True)
+    return [run_id for run_id, outcome in pairs if outcome in BROKEN]

@@ -10,6 +10,7 @@ import pyarrow as pa
 from surgsim.compare.aggregates import iqm_interval, mean_rank, ranks, scores
 from surgsim.compare.intervals import Interval
 from surgsim.compare.observations import COMPLETED, Observations, metric_named
+from surgsim.compare.places import places_of
 
 _RESAMPLES = 1000
 
@@ -24,10 +25,12 @@ class LeaderboardRow:
         completed: Those that ran to their end.
         failed: Those that did not.
         failures: Failed runs by outcome.
+        not_done: Completed runs that did not do their task.
         undefined: Completed runs for which the metric is not defined.
         value: Interquartile mean of the metric over completed runs, in its unit.
         score: Interquartile mean of the normalised score: 1 is the best controller of each setting.
         rank: Mean rank over scenarios, failures last.
+        place: One, plus the controllers that are better; None where places were not asked for.
     """
 
     controller: str
@@ -35,14 +38,21 @@ class LeaderboardRow:
     completed: int
     failed: int
     failures: Mapping[str, int]
+    not_done: int
     undefined: int
     value: Interval
     score: Interval
     rank: Interval
+    place: int | None = None
 
 
-def leaderboard(table: pa.Table | Observations, metric: str) -> list[LeaderboardRow]:
+def leaderboard(table: pa.Table | Observations, metric: str, *, places: bool = True) -> list[LeaderboardRow]:
     """Rows for `metric`, the best mean rank first.
+
+    Args:
+        table: The batch.
+        metric: Name of the metric.
+        places: Whether to compare the controllers in pairs for their places, which takes a while.
 
     Raises:
         SurgsimError: If the metric is unknown, or the table is not one of batch results.
@@ -50,12 +60,18 @@ def leaderboard(table: pa.Table | Observations, metric: str) -> list[Leaderboard
     metric_named(metric)
     runs = table if isinstance(table, Observations) else Observations.of(table)
     score, rank = scores(runs, metric), ranks(runs, metric)
-    rows = [_row(runs, name, metric, score, rank) for name in runs.controllers]
+    place = places_of(runs, metric) if places else {}
+    rows = [_row(runs, name, metric, score, rank, place.get(name)) for name in runs.controllers]
     return sorted(rows, key=_order)
 
 
 def _row(
-    everyone: Observations, name: str, metric: str, score: np.ndarray, rank: np.ndarray
+    everyone: Observations,
+    name: str,
+    metric: str,
+    score: np.ndarray,
+    rank: np.ndarray,
+    place: int | None,
 ) -> LeaderboardRow:
     mine = np.asarray(everyone.controller == name, dtype=bool)
     runs = everyone.where(mine)
@@ -67,10 +83,12 @@ def _row(
         completed=completed,
         failed=len(runs) - completed,
         failures=dict(Counter(outcome for outcome in runs.outcome.tolist() if outcome != COMPLETED)),
+        not_done=int(runs.not_done.sum()),
         undefined=completed - int(np.isfinite(values).sum()),
         value=iqm_interval(runs, values, identity, _RESAMPLES),
         score=iqm_interval(runs, score[mine], f"{identity} score", _RESAMPLES),
         rank=mean_rank(runs, rank[mine], identity, _RESAMPLES),
+        place=place,
     )
 
 

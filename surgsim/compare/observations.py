@@ -1,7 +1,7 @@
 """The table of a batch as arrays: what the statistics work on."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -30,6 +30,9 @@ class Observations:
         seed: Seeds (n,).
         outcome: Names of the outcomes (n,).
         metrics: Values by metric's name (n,); NaN where a metric is not defined.
+        success: Whether the task was done (n,), 1 or 0; NaN where the task does not say.
+        exceeded: Metrics past their thresholds (n,), as text with commas.
+        smallest: Smallest differences that matter, by metric, where others than the metrics' own are wanted.
     """
 
     scenario: Texts
@@ -38,10 +41,17 @@ class Observations:
     seed: NDArray[np.int64]
     outcome: Texts
     metrics: Mapping[str, Array]
+    success: Array
+    exceeded: Texts
+    smallest: Mapping[str, float] = field(default_factory=dict)
 
     @staticmethod
-    def of(table: pa.Table) -> "Observations":
+    def of(table: pa.Table, smallest: Mapping[str, float] | None = None) -> "Observations":
         """Observations of a batch's table.
+
+        Args:
+            table: The table.
+            smallest: Smallest differences that matter, by metric; the metrics' own for the others.
 
         Raises:
             SurgsimError: If a column is missing or not of its type.
@@ -52,9 +62,18 @@ class Observations:
             }
             seed = np.array(table.column("seed").to_pylist(), dtype=np.int64)
             metrics = {name: _numbers(table, name) for name in METRICS}
+            success = _numbers(table, "success")
+            exceeded = [text or "" for text in table.column("exceeded").to_pylist()]
         except (KeyError, TypeError, ValueError, pa.ArrowException) as error:
             raise SurgsimError(f"not a table of batch results: {error}") from error
-        return Observations(**texts, seed=seed, metrics=metrics)
+        return Observations(
+            **texts,
+            seed=seed,
+            metrics=metrics,
+            success=success,
+            exceeded=np.array(exceeded, dtype=object),
+            smallest=dict(smallest or {}),
+        )
 
     def __len__(self) -> int:
         return len(self.seed)
@@ -63,6 +82,16 @@ class Observations:
     def completed(self) -> Mask:
         """Whether a run ran to its end (n,)."""
         return np.asarray(self.outcome == COMPLETED, dtype=bool)
+
+    @property
+    def not_done(self) -> Mask:
+        """Whether a run ran to its end, but did not do its task (n,)."""
+        return np.asarray(self.completed & (self.success == 0.0), dtype=bool)
+
+    @property
+    def standing(self) -> NDArray[np.int64]:
+        """What comes before any figure (n,): 2 where the task was done, 1 where not, 0 for a failure."""
+        return np.asarray(2 * self.completed - 1 * self.not_done, dtype=np.int64)
 
     @property
     def controllers(self) -> list[str]:
@@ -78,6 +107,10 @@ class Observations:
         """Values of `metric` (n,); NaN for a run that did not complete."""
         return np.where(self.completed, self.metrics[metric], np.nan)
 
+    def matters(self, metric: str) -> float:
+        """Smallest difference of `metric` that matters, in its unit; 0 if any does."""
+        return self.smallest.get(metric, metric_named(metric).matters)
+
     def where(self, mask: Mask) -> "Observations":
         """The runs of which `mask` is true."""
         return replace(
@@ -87,6 +120,8 @@ class Observations:
             parameters=self.parameters[mask],
             seed=self.seed[mask],
             outcome=self.outcome[mask],
+            success=self.success[mask],
+            exceeded=self.exceeded[mask],
             metrics={name: values[mask] for name, values in self.metrics.items()},
         )
 

@@ -6,9 +6,22 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from surgsim.compare.observations import COMPLETED, Array, Observations
+from surgsim.compare.observations import Array, Observations, metric_named
 
 Key = tuple[str, str, int]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Run:
+    """What a pair needs of a run.
+
+    Attributes:
+        standing: 2 where the task was done, 1 where the run only completed, 0 for a failure.
+        value: The metric; NaN where it is not defined.
+    """
+
+    standing: int
+    value: float
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -23,84 +36,90 @@ class Pairs:
         left_out: Pairs left out of the differences, by reason.
         failed_a: Runs of the first controller that did not complete, among pairs.
         failed_b: The same of the second.
+        not_done_a: Runs of the first that completed without doing their task, among pairs.
+        not_done_b: The same of the second.
         differences: First minus second, for each scenario its units (seeds,).
         wins: Share of a unit's pairs that the first wins, ties counted half, for each scenario (seeds,). A
-            failed run loses to a completed one, two failed ones tie.
+            task done beats one that is not, and that a failure. Two failures tie, and so do two values that
+            differ by less than matters.
         mean_a: Mean of the first over the counted pairs, scenarios weighing the same; NaN if there are none.
         mean_b: The same of the second.
         scale: Largest value among the counted pairs.
+        matters: Smallest difference that matters.
     """
 
     count: int
     left_out: Mapping[str, int]
     failed_a: int
     failed_b: int
+    not_done_a: int
+    not_done_b: int
     differences: tuple[Array, ...]
     wins: tuple[Array, ...]
     mean_a: float
     mean_b: float
     scale: float
+    matters: float
 
 
-def pair_runs(runs: Observations, a: str, b: str, metric: str, lower_is_better: bool | None) -> Pairs:
-    """Pair the runs of controllers `a` and `b`."""
+def pair_runs(runs: Observations, a: str, b: str, metric: str) -> Pairs:
+    """Pair the runs of controllers `a` and `b` by `metric`."""
+    lower_is_better, matters = metric_named(metric).lower_is_better, runs.matters(metric)
     first, second = (_by_key(runs.of_controller(name), metric) for name in (a, b))
+    both = {key: (first[key], second[key]) for key in sorted({*first} & {*second})}
     left_out: Counter[str] = Counter()
-    failed_a = failed_b = 0
-    values: dict[Key, tuple[float, float]] = {}
-    wins: dict[Key, float] = {}
-    for key in sorted({*first, *second}):
-        if key not in first or key not in second:
-            left_out[f"run of {a if key not in first else b} missing"] += 1
-            continue
-        (outcome_a, value_a), (outcome_b, value_b) = first[key], second[key]
-        failed_a += outcome_a != COMPLETED
-        failed_b += outcome_b != COMPLETED
-        reason = _reason(a, b, (outcome_a, value_a), (outcome_b, value_b))
-        left_out[reason] += bool(reason)
-        if not reason:
-            values[key] = (value_a, value_b)
-        if "not defined" not in reason:
-            wins[key] = _win(
-                outcome_a == COMPLETED, value_a, outcome_b == COMPLETED, value_b, lower_is_better
-            )
+    for key in {*first} ^ {*second}:
+        left_out[f"run of {a if key not in first else b} missing"] += 1
+    reasons = {key: _reason(a, b, *pair) for key, pair in both.items()}
+    left_out.update(reason for reason in reasons.values() if reason)
+    counted = {key: pair for key, pair in both.items() if not reasons[key]}
+    wins = {
+        key: win(*pair, lower_is_better, matters)
+        for key, pair in both.items()
+        if "not defined" not in reasons[key]
+    }
     return Pairs(
-        count=len(values),
-        left_out={reason: count for reason, count in left_out.items() if count},
-        failed_a=failed_a,
-        failed_b=failed_b,
-        differences=_strata({key: x - y for key, (x, y) in values.items()}),
+        count=len(counted),
+        left_out=dict(sorted(left_out.items())),
+        failed_a=sum(x.standing == 0 for x, _ in both.values()),
+        failed_b=sum(y.standing == 0 for _, y in both.values()),
+        not_done_a=sum(x.standing == 1 for x, _ in both.values()),
+        not_done_b=sum(y.standing == 1 for _, y in both.values()),
+        differences=_strata({key: x.value - y.value for key, (x, y) in counted.items()}),
         wins=_strata(wins),
-        mean_a=_mean({key: x for key, (x, _) in values.items()}),
-        mean_b=_mean({key: y for key, (_, y) in values.items()}),
-        scale=max((abs(x) for pair in values.values() for x in pair), default=0.0),
+        mean_a=_mean({key: x.value for key, (x, _) in counted.items()}),
+        mean_b=_mean({key: y.value for key, (_, y) in counted.items()}),
+        scale=max((abs(run.value) for pair in counted.values() for run in pair), default=0.0),
+        matters=matters,
     )
 
 
-def _by_key(runs: Observations, metric: str) -> dict[Key, tuple[str, float]]:
+def _by_key(runs: Observations, metric: str) -> dict[Key, Run]:
     keys = zip(runs.scenario.tolist(), runs.parameters.tolist(), runs.seed.tolist(), strict=True)
-    return dict(zip(keys, zip(runs.outcome.tolist(), runs.values(metric).tolist(), strict=True), strict=True))
+    found = zip(runs.standing.tolist(), runs.values(metric).tolist(), strict=True)
+    return {key: Run(standing=s, value=x) for key, (s, x) in zip(keys, found, strict=True)}
 
 
-def _reason(a: str, b: str, run_a: tuple[str, float], run_b: tuple[str, float]) -> str:
+def _reason(a: str, b: str, run_a: Run, run_b: Run) -> str:
     """Why a pair gives no difference; empty if it does."""
-    failed = [name for name, (outcome, _) in ((a, run_a), (b, run_b)) if outcome != COMPLETED]
+    failed = [name for name, run in ((a, run_a), (b, run_b)) if run.standing == 0]
     if len(failed) == 2:
         return "both failed"
     if failed:
         return f"{failed[0]} failed"
-    if not np.isfinite([run_a[1], run_b[1]]).all():
+    if not np.isfinite([run_a.value, run_b.value]).all():
         return "metric not defined"
     return ""
 
 
-def _win(done_a: bool, value_a: float, done_b: bool, value_b: float, lower_is_better: bool | None) -> float:
-    """1 if the first is better, 0.5 for a tie, 0 otherwise."""
-    if not (done_a and done_b):
-        return 0.5 + 0.5 * (done_a - done_b)
-    if value_a == value_b or lower_is_better is None:
+def win(a: Run, b: Run, lower_is_better: bool | None, matters: float = 0.0) -> float:
+    """1 if `a` is better, 0.5 for a tie, 0 otherwise."""
+    if a.standing != b.standing:
+        return float(a.standing > b.standing)
+    difference = a.value - b.value
+    if a.standing == 0 or lower_is_better is None or difference == 0.0 or abs(difference) < matters:
         return 0.5
-    return float((value_a < value_b) == lower_is_better)
+    return float((difference < 0.0) == lower_is_better)
 
 
 def _strata(values: Mapping[Key, float]) -> tuple[Array, ...]:

@@ -17,6 +17,7 @@ from typing import Any
 from surgsim.compare.job import CRASHED, WORKER_DIED, Job, attempt
 from surgsim.compare.workers import Done, record_failure, stopped
 from surgsim.errors import SurgsimError
+from surgsim.recording.files import write_file
 from surgsim.runs.folder import whole_folder
 
 RETRIES = 3
@@ -102,7 +103,7 @@ def _collect(ray: Any, reference: Any, job: Job) -> str:
     try:
         with whole_folder(Path(job.folder)) as draft:
             for name, content in files.items():
-                (draft / name).write_bytes(content)
+                write_file(draft / name, content)
     except SurgsimError as error:
         raise stopped(str(error)) from error
     return str(text)

@@ -4,16 +4,17 @@ import itertools
 import json
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Self
 
-from pydantic import AfterValidator, Field, model_validator
+from pydantic import AfterValidator, Field, FiniteFloat, field_validator, model_validator
 
 from surgsim.catalog import Name, PartConfig
 from surgsim.compare.axis import AxisConfig, Values
-from surgsim.errors import ScenarioError, SurgsimError
+from surgsim.errors import ScenarioError, SurgsimError, unknown_name
+from surgsim.metrics.catalog import METRICS
 from surgsim.scenario.load import find, load_scenario, shipped
 from surgsim.scenario.schema import Scenario
 from surgsim.scenario.validate import validate
@@ -61,6 +62,7 @@ class SuiteConfig(PartConfig):
         seeds: `0:10`, `3` or `1,4,9`.
         record: Whether every run writes its recording.
         settings: `key.path=value` settings of every run.
+        matters: Smallest differences that matter, by metric, in its unit; the metrics' own for the others.
     """
 
     name: Name
@@ -73,6 +75,15 @@ class SuiteConfig(PartConfig):
     seeds: Annotated[str, AfterValidator(_check_seeds)] = "0"
     record: bool = False
     settings: tuple[str, ...] = ()
+    matters: dict[str, Annotated[FiniteFloat, Field(ge=0.0)]] = Field(default_factory=dict)
+
+    @field_validator("matters")
+    @classmethod
+    def _of_metrics(cls, matters: dict[str, float]) -> dict[str, float]:
+        for name in matters:
+            if name not in METRICS:
+                raise ValueError(unknown_name(name, "metric", METRICS))
+        return matters
 
     @model_validator(mode="after")
     def _seeds_have_one_place(self) -> Self:
@@ -250,14 +261,25 @@ def check_runs(specs: Sequence[RunSpec]) -> list[Scenario]:
 
 
 def with_changes(
-    suite: SuiteConfig, controllers: Sequence[str] | None, seeds: str | None, record: bool
+    suite: SuiteConfig,
+    controllers: Sequence[str] | None,
+    seeds: str | None,
+    record: bool,
+    settings: Sequence[str] = (),
+    matters: Mapping[str, float] | None = None,
 ) -> SuiteConfig:
-    """`suite` with what the command line says instead.
+    """`suite` with what the command line says instead; its `key.path=value` settings hold in every run.
 
     Raises:
-        ScenarioError: If the seeds cannot be read.
+        ScenarioError: If the seeds cannot be read, or a setting is of a key that the suite itself varies.
     """
-    changes: dict[str, Any] = {"record": suite.record or record}
+    for setting in settings:
+        _check_setting(suite, setting)
+    changes: dict[str, Any] = {
+        "record": suite.record or record,
+        "settings": (*suite.settings, *settings),
+        "matters": {**suite.matters, **(matters or {})},
+    }
     if controllers is not None:
         changes["controllers"] = tuple(_from_here(name) for name in controllers)
     if seeds is not None:
@@ -267,6 +289,26 @@ def with_changes(
             raise ScenarioError("--seeds", str(error)) from error
         changes["seeds"] = seeds
     return suite.model_copy(update=changes)
+
+
+def _check_setting(suite: SuiteConfig, setting: str) -> None:
+    """Refuse a setting that runs would not follow, as the suite sets the key for each of them."""
+    key = setting.partition("=")[0].strip()
+    where = f"--set {setting}"
+    if key == "seed":
+        raise ScenarioError(where, "the seeds of a suite are given by --seeds")
+    if key == "controller":
+        raise ScenarioError(where, "the controllers of a suite are given by --controllers")
+    varied = [name for name in suite.grid if _one_inside_the_other(name, key)]
+    for name, axis in (*suite.axes.items(), *suite.sweeps.items()):
+        if any(_one_inside_the_other(touched, key) for touched in axis.touched_keys()):
+            varied.append(name)
+    if varied:
+        raise ScenarioError(where, f"suite '{suite.name}' varies this itself: {', '.join(varied)}")
+
+
+def _one_inside_the_other(a: str, b: str) -> bool:
+    return f"{a}.".startswith(f"{b}.") or f"{b}.".startswith(f"{a}.")
 
 
 def _from_here(name: str) -> str:

@@ -15,7 +15,7 @@ from surgsim.compare.job import OUTCOMES
 from surgsim.errors import SurgsimError, unknown_name
 from surgsim.metrics.catalog import METRICS
 from surgsim.metrics.timing import TIMING_METRICS
-from surgsim.recording.files import replacing
+from surgsim.recording.files import replacing, write_file
 from surgsim.recording.sealed import read_sealed
 from surgsim.runs.folder import SCHEMA_VERSION
 from surgsim.scenario.wording import one_line
@@ -50,9 +50,11 @@ def schema() -> pa.Schema:
     fields += [pa.field("seed", pa.int64()), pa.field("parameters", pa.string())]
     fields += [pa.field("outcome", pa.string()), pa.field("outcome_t_s", pa.float64())]
     fields += [pa.field("outcome_detail", pa.string())]
+    fields += [pa.field("success", pa.bool_()), pa.field("success_reason", pa.string())]
+    fields += [pa.field("exceeded", pa.string())]
     fields += [pa.field(name, pa.float64()) for name in METRICS]
     fields += [pa.field("wall_time_s", pa.float64())]
-    texts = ("scenario_sha256", "surgsim_version", "commit", "machine", "folder", "recording")
+    texts = ("scenario_sha256", "surgsim_version", "code_sha256", "commit", "machine", "folder", "recording")
     return pa.schema(fields + [pa.field(name, pa.string()) for name in texts])
 
 
@@ -78,10 +80,14 @@ def read_row(root: Path, row: Row) -> dict[str, Any]:
             "outcome": outcome["name"],
             "outcome_t_s": outcome["t_s"],
             "outcome_detail": outcome["detail"],
+            "success": summary["success"],
+            "success_reason": summary["success_reason"],
+            "exceeded": ",".join(held["metric"] for held in summary["thresholds"] if held["exceeded"]),
             **{name: summary["metrics"].get(name) for name in METRICS},
             "wall_time_s": provenance["wall_time_s"],
             "scenario_sha256": provenance["scenario_sha256"],
             "surgsim_version": provenance["surgsim"],
+            "code_sha256": provenance["code_sha256"],
             "commit": provenance["commit"],
             "machine": provenance["machine"],
             "folder": row.folder,
@@ -99,9 +105,12 @@ def write_table(root: Path, rows: Sequence[Row]) -> pa.Table:
     """
     parts = [_part(root, row) for row in rows]
     table = pa.Table.from_batches(parts, schema=schema())
-    for name, write in ((PARQUET, pa.parquet.write_table), (CSV, pa.csv.write_csv)):
-        with replacing(root / name) as draft:  # two shards may end at the same time
-            write(sealed_table(table), draft)
+    # The Parquet file is last: with it the batch is finished. Two shards may end at the same time.
+    for name, write in ((CSV, pa.csv.write_csv), (PARQUET, pa.parquet.write_table)):
+        content = pa.BufferOutputStream()
+        write(sealed_table(table), content)
+        with replacing(root / name) as draft:
+            write_file(draft, content.getvalue().to_pybytes())
     return table
 
 

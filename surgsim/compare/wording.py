@@ -1,32 +1,10 @@
 """Figures and intervals as a person reads them."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 from surgsim.compare.intervals import Interval
-
-_UNITS = {
-    "mm_per_s": "mm/s",
-    "m_per_s": "m/s",
-    "mm": "mm",
-    "rad": "rad",
-    "us": "µs",
-    "s": "s",
-    "n": "N",
-    "nm": "N m",
-    "j": "J",
-    "kg": "kg",
-    "m": "m",
-    "deg": "°",
-}
-
-
-def unit_of(name: str) -> str:
-    """Unit that a name's suffix says, as it is printed; empty for a pure number."""
-    for suffix, unit in _UNITS.items():
-        if name.endswith(f"_{suffix}"):
-            return unit
-    return ""
+from surgsim.metrics.metric import Metric
 
 
 def number(value: float | None, digits: int = 3) -> str:
@@ -49,6 +27,43 @@ def bracket(interval: Interval, digits: int = 3) -> str:
     if interval.low is None or interval.high is None:
         return ""
     return f"[{number(interval.low, digits)}, {number(interval.high, digits)}]"
+
+
+def plural(count: int, noun: str) -> str:
+    """`1 seed`, `2 seeds`."""
+    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
+
+
+def heading_of(metric: Metric) -> tuple[str, str]:
+    """A metric's heading without its unit, and the unit; the latter is empty for a pure number."""
+    words, _, unit = metric.heading.partition(" [")
+    return words, unit.removesuffix("]")
+
+
+def exactly(value: float, unit: str) -> str:
+    """A figure that was set, as it was set: `0.1 mm`."""
+    return f"{value:g} {unit}".rstrip().replace("-", "−")
+
+
+def with_unit(value: float | None, unit: str, digits: int = 3) -> str:
+    """`1.58 mm`."""
+    return f"{number(value, digits)} {unit}".rstrip()
+
+
+def seeds_of(sizes: Sequence[int]) -> str:
+    """How many seeds each scenario has: `20 seeds in each of 2 scenarios`."""
+    if len(sizes) == 1:
+        return plural(sizes[0], "seed")
+    if len(set(sizes)) == 1:
+        return f"{plural(sizes[0], 'seed')} in each of {len(sizes)} scenarios"
+    return f"{min(sizes)} to {max(sizes)} seeds in each of {len(sizes)} scenarios" if sizes else "no seed"
+
+
+def listed(names: Sequence[str], most: int = 4) -> str:
+    """`a`, `a and b`, `a, b and c`; of many the first ones and how many more."""
+    if len(names) > most:
+        return f"{', '.join(names[: most - 1])} and {len(names) - most + 1} more"
+    return " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
 
 
 def counted(counts: Mapping[str, int]) -> str:

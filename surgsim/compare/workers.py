@@ -2,8 +2,8 @@
 
 import multiprocessing
 import os
-import signal
 import threading
+import time
 from collections import deque
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
@@ -13,10 +13,14 @@ from pathlib import Path
 from typing import Any
 
 from surgsim.compare.job import CRASHED, WORKER_DIED, DiskError, Job, attempt, write_failure
+from surgsim.compiling import Compiling, listening, tell
 from surgsim.errors import SurgsimError
+from surgsim.runs.drafts import clear_drafts
+from surgsim.runs.stop import held_back, obey_parent
 
 TRIES = 2
 _MOST_STILLBORN = 5
+_PATIENCE_S = 10.0
 _SPAWN = multiprocessing.get_context("spawn")
 
 
@@ -78,7 +82,8 @@ class _Pool:
         """Start a process, and give it the next job."""
         here, there = _SPAWN.Pipe()
         process = _SPAWN.Process(target=_serve, args=(there,), daemon=True)
-        process.start()
+        with held_back():  # Ctrl-C reaches every process of a terminal: not one that cannot take it yet
+            process.start()
         there.close()
         worker = _Worker(process, here)
         self.workers.append(worker)
@@ -111,6 +116,9 @@ class _Pool:
             kind, text = worker.pipe.recv()
         except (EOFError, OSError):
             return self.bury(worker)
+        if kind == "compiling":
+            tell(text)
+            return []
         if kind == "ready":
             worker.began, self.stillborn = True, 0
             return []
@@ -148,12 +156,20 @@ class _Pool:
         return done
 
     def dismiss(self) -> None:
-        """End all processes."""
+        """End all processes: in order, or else by force; no draft of theirs is left."""
         for worker in self.workers:
             worker.pipe.close()
             worker.process.terminate()
+        until = time.monotonic() + _PATIENCE_S
         for worker in self.workers:
-            worker.process.join(10)
+            worker.process.join(max(0.0, until - time.monotonic()))
+            if worker.process.is_alive():
+                worker.process.kill()
+                worker.process.join()
+            if worker.index is not None:
+                folder = Path(self.jobs[worker.index].folder)
+                with suppress(OSError):
+                    clear_drafts(folder.parent, folder.name)
 
 
 def stopped(text: str) -> SurgsimError:
@@ -175,17 +191,24 @@ def record_failure(job: Job, name: str, detail: str) -> None:
 
 def _serve(pipe: Connection) -> None:
     """A worker's life: jobs in, outcomes out, until the pipe closes or the parent is gone."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent decides
+    obey_parent()
     threading.Thread(target=_die_with_parent, daemon=True).start()
     with suppress(OSError):
         pipe.send(("ready", ""))
+
+    def forward(compiling: Compiling) -> None:
+        with suppress(OSError):
+            pipe.send(("compiling", compiling))
+
     while True:
         try:
             job = pipe.recv()
         except (EOFError, OSError):
             return
         try:
-            pipe.send(attempt(job))
+            with listening(forward):
+                answer = attempt(job)
+            pipe.send(answer)
         except OSError:
             return
 

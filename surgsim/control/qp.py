@@ -1,6 +1,8 @@
-"""Dense quadratic programs: daqp natively and warm, or any back end of qpsolvers by name."""
+"""Dense quadratic programs, by one of several solvers: daqp, OSQP, or another that qpsolvers knows."""
 
 import warnings
+from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import daqp
@@ -8,6 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+Solve = Callable[[Array, Array, Array, Array, Array, Array, Array], Array | None]
+"""H, f, lower, upper, G, G_lower, G_upper to the minimiser, or None: what a back end is."""
+
+SHIPPED = ("daqp", "osqp")
+"""Back ends that start from their last answer; they are tested on every scenario that names a QP."""
 
 _EQUALITY, _INEQUALITY = 5, 0
 
@@ -15,18 +22,15 @@ _EQUALITY, _INEQUALITY = 5, 0
 class DenseQp:
     """min 1/2 x^T H x + f^T x  subject to  lower <= x <= upper,  G_lower <= G x <= G_upper.
 
-    Rows with equal bounds are equalities. With the `daqp` back end the workspace and the active set of the
-    last solve are reused.
+    H is positive definite; rows with equal bounds are equalities. `daqp` and `osqp` start from what they know
+    of the last solve, so that a run needs a `DenseQp` of its own.
 
     Args:
-        backend: `daqp`, or the name of another solver that qpsolvers knows here.
+        backend: One of `SHIPPED`, or the name of another solver that qpsolvers knows here.
     """
 
     def __init__(self, backend: str = "daqp") -> None:
-        self._backend = backend
-        self._model: Any = None
-        self._shape: tuple[int, ...] = ()
-        self._sense = np.zeros(0, dtype=np.int32)
+        self._solve = _backend(backend)
 
     def solve(
         self, H: Array, f: Array, lower: Array, upper: Array, G: Array, G_lower: Array, G_upper: Array
@@ -34,11 +38,28 @@ class DenseQp:
         """The minimiser, or None if there is none within the back end's limits."""
         if (lower > upper).any() or (G_lower > G_upper).any():
             return None
-        if self._backend == "daqp":
-            return self._solve_daqp(H, f, lower, upper, G, G_lower, G_upper)
-        return _solve_with(self._backend, H, f, lower, upper, G, G_lower, G_upper)
+        return self._solve(H, f, lower, upper, G, G_lower, G_upper)
 
-    def _solve_daqp(
+
+def _backend(name: str) -> Solve:
+    if name == "daqp":
+        return _Daqp().solve
+    if name == "osqp":
+        from surgsim.control.qp_osqp import Osqp  # a third of a second, and only this back end needs it
+
+        return Osqp().solve
+    return partial(_solve_with, name)
+
+
+class _Daqp:
+    """daqp natively: the workspace and the active set of the last solve are reused."""
+
+    def __init__(self) -> None:
+        self._model: Any = None
+        self._shape: tuple[int, ...] = ()
+        self._sense = np.zeros(0, dtype=np.int32)
+
+    def solve(
         self, H: Array, f: Array, lower: Array, upper: Array, G: Array, G_lower: Array, G_upper: Array
     ) -> Array | None:
         low, high = np.concatenate((lower, G_lower)), np.concatenate((upper, G_upper))

@@ -10,8 +10,7 @@ from surgsim.live.controls import Controls, Device
 from surgsim.live.pace import Pace
 from surgsim.live.session import drive, signals_end
 from surgsim.live.window import Window, check_display
-from surgsim.metrics.catalog import compute_metrics
-from surgsim.runs.folder import RunResult, check_target, write_run
+from surgsim.runs.folder import RunResult, check_target, result_of, write_run
 from surgsim.scenario.schema import Scenario
 from surgsim.simulate.loop import Progress, Simulation
 from surgsim.simulate.setup import Setup, prepare
@@ -84,6 +83,6 @@ def _start(scenario: Scenario, source: Source) -> tuple[Setup, Simulation]:
 def _written(
     scenario: Scenario, trace: Trace, recorder: Recorder, wall_s: float, folder: Path, record: bool
 ) -> RunResult:
-    result = RunResult(trace=trace, metrics=compute_metrics(trace), wall_time_s=wall_s)
+    result = result_of(trace, wall_s)
     write_run(scenario, result, folder, record=record, operator_input=recorder.text())
     return result

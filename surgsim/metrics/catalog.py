@@ -1,6 +1,8 @@
 """All metrics, and their values for a trace."""
 
 import math
+from collections.abc import Mapping
+from dataclasses import dataclass
 
 from surgsim.metrics import (
     accuracy,
@@ -14,7 +16,7 @@ from surgsim.metrics import (
     teleoperation,
     timing,
 )
-from surgsim.metrics.metric import Metric
+from surgsim.metrics.metric import Metric, Undefined
 from surgsim.trace.trace import Trace
 
 GROUPS: tuple[tuple[Metric, ...], ...] = tuple(
@@ -34,15 +36,45 @@ GROUPS: tuple[tuple[Metric, ...], ...] = tuple(
 )
 """Metrics of one subject, in the order in which they are printed."""
 
+_LONGEST_REASON = 300
 METRICS: dict[str, Metric] = {metric.name: metric for group in GROUPS for metric in group}
 
 
-def compute_metrics(trace: Trace) -> dict[str, float | None]:
-    """Every metric of `trace`; None where it is not defined, e.g. an RCM error without a trocar."""
+@dataclass(frozen=True, kw_only=True)
+class Evaluation:
+    """Metrics of a trace.
+
+    Attributes:
+        values: Every metric; None where the trace does not define it, e.g. an RCM error without a trocar.
+        undefined: Why, for each metric that could not be computed: the error that it raised.
+    """
+
+    values: Mapping[str, float | None]
+    undefined: Mapping[str, str]
+
+
+def evaluate(trace: Trace) -> Evaluation:
+    """Compute every metric of `trace`; one that raises is None, and costs no other."""
     active = trace.active()
-    return {
-        name: _finite(metric.compute(trace if metric.whole else active)) for name, metric in METRICS.items()
-    }
+    values: dict[str, float | None] = {}
+    undefined: dict[str, str] = {}
+    for name, metric in METRICS.items():
+        try:
+            values[name] = _finite(metric.compute(trace if metric.whole else active))
+        except Exception as error:  # whatever it is: the run is done, and is not to be lost
+            values[name], undefined[name] = None, _reason(error)
+    return Evaluation(values=values, undefined=undefined)
+
+
+def compute_metrics(trace: Trace) -> dict[str, float | None]:
+    """Every metric of `trace`; None where it is not defined or could not be computed."""
+    return dict(evaluate(trace).values)
+
+
+def _reason(error: Exception) -> str:
+    """What an error says, on one line; one that is no `Undefined` is named, since it is a bug."""
+    said = " ".join(str(error).split())[:_LONGEST_REASON]
+    return said if isinstance(error, Undefined) else f"{type(error).__name__}: {said}"
 
 
 def _finite(value: float) -> float | None:

@@ -3,7 +3,7 @@
 import numpy as np
 
 from surgsim.metrics.accuracy import rms
-from surgsim.metrics.metric import Metric
+from surgsim.metrics.metric import CHOICE, Metric
 from surgsim.trace.trace import Trace
 
 
@@ -42,23 +42,42 @@ def resolver_residual_rms(trace: Trace) -> float:
 METRICS = (
     Metric(
         name="joint_limit_margin_min_rad",
+        heading="margin to the joint limits, smallest [rad]",
+        matters=0.01,
+        matters_source=CHOICE,
         meaning="smallest distance of a joint from its position limit",
         compute=joint_limit_margin_min_rad,
         lower_is_better=False,
     ),
     Metric(
         name="joint_velocity_ratio_max",
+        heading="joint velocity over its limit, largest",
+        matters=0.01,
+        matters_source=CHOICE,
         meaning="largest joint velocity over its limit",
         compute=joint_velocity_ratio_max,
     ),
-    Metric(name="torque_ratio_max", meaning="largest joint torque over its limit", compute=torque_ratio_max),
+    Metric(
+        name="torque_ratio_max",
+        heading="joint torque over its limit, largest",
+        matters=0.01,
+        matters_source=CHOICE,
+        meaning="largest joint torque over its limit",
+        compute=torque_ratio_max,
+    ),
     Metric(
         name="saturated_fraction",
+        heading="ticks with a torque at its limit, share",
+        matters=0.01,
+        matters_source=CHOICE,
         meaning="fraction of ticks with a torque cut at its limit",
         compute=saturated_fraction,
     ),
     Metric(
         name="resolver_residual_rms",
+        heading="velocity left unmet, RMS [m/s]",
+        matters=1e-4,
+        matters_source=CHOICE,
         meaning="RMS of the velocity rows that the resolver left unmet, m/s",
         compute=resolver_residual_rms,
     ),

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surgsim.metrics.accuracy import rms
-from surgsim.metrics.metric import Metric
+from surgsim.metrics.metric import CHOICE, FORCE_RESOLUTION, Metric
 from surgsim.trace.trace import Trace
 
 Array = NDArray[np.float64]
@@ -40,21 +40,33 @@ def largest(trace: Trace, block: str) -> float:
 METRICS = (
     Metric(
         name="trocar_force_rms_n",
+        heading="force on the wall, RMS [N]",
+        matters=0.05,
+        matters_source=FORCE_RESOLUTION,
         meaning="RMS force of the shaft on the abdominal wall",
         compute=trocar_force_rms_n,
     ),
     Metric(
         name="trocar_force_max_n",
+        heading="force on the wall, largest [N]",
+        matters=0.05,
+        matters_source=FORCE_RESOLUTION,
         meaning="largest force of the shaft on the abdominal wall",
         compute=lambda trace: largest(trace, "trocar_force"),
     ),
     Metric(
         name="trocar_impulse_n_s",
+        heading="force on the wall, integral over time [N s]",
+        matters=0.5,
+        matters_source=CHOICE,
         meaning="integral over time of the size of the force on the abdominal wall",
         compute=trocar_impulse_n_s,
     ),
     Metric(
         name="tip_force_max_n",
+        heading="force on the tip, largest [N]",
+        matters=0.05,
+        matters_source=FORCE_RESOLUTION,
         meaning="largest force of the surroundings on the tip",
         compute=lambda trace: largest(trace, "tip_force"),
     ),

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surgsim.control.self_motion import SelfMotion, SelfMotionPoint
-from surgsim.metrics.metric import Metric
+from surgsim.metrics.metric import CHOICE, Metric, Undefined
 from surgsim.models.arm import ArmModel
 from surgsim.models.config import SceneConfig
 from surgsim.trace.trace import Trace
@@ -16,6 +16,9 @@ from surgsim.trace.trace import Trace
 Array = NDArray[np.float64]
 
 SAMPLES = 10
+"""At how many ticks of a run mu* is sought at least."""
+_MOST_SAMPLES, _WAY_M = 30, 0.02
+_SHORTEST_LEVER_M = 0.02
 _STARTS = 12
 _COARSE_RAD = 1e-3
 """Where the metric's climbs end; mu is stationary there, so its relative error is about the square."""
@@ -26,37 +29,78 @@ def attainable_manipulability(
 ) -> tuple[Array, Array]:
     """Largest manipulability mu* that self-motion reaches at the tip positions of a run.
 
-    At `samples` ticks spread over the run: tip and trocar where they were, joints inside their limits. The
-    local optima that can be reached from the run's first configuration are sought once and then followed, and
-    so is the one uphill of each tick's own configuration, by climbs that end at a step below `tolerance_rad`.
+    At `samples` ticks spread over the run: the tip where it was, joints inside their limits, and the shaft
+    held through its own point nearest to the trocar. That is the trocar itself where there is no RCM error;
+    where there is one, the run's configuration is among those compared, and mu is never above mu*. Ticks with
+    the tip in the port are left out: tip and port are then one point, which does not say how the shaft turns.
+
+    The local optima that can be reached from the run's first configuration are sought once and then followed,
+    and so is the one uphill of each tick's own configuration, by climbs that end at a step below
+    `tolerance_rad`.
 
     Returns:
-        Row numbers (samples,), and mu* there (samples,).
+        Row numbers (at most samples,), and mu* there.
     """
     scene = _scene_of(trace)
     manifold = _manifold_of(scene)
+    centres = _centres(trace)
     rows = np.unique(np.linspace(0, len(trace) - 1, samples).astype(int))
-    has_trocar = trace.meta.scenario.get("trocar") is not None
+    if centres is not None:
+        lever = np.linalg.norm(centres - trace.block("tip"), axis=1)
+        rows = rows[lever[rows] > _SHORTEST_LEVER_M]
     best = np.full(len(rows), np.nan)
     followed: list[SelfMotionPoint] = []
     for k, row in enumerate(rows):
         q, p_WT = trace.block("q")[row], trace.block("tip")[row]
-        p_WC = trace.block("trocar")[row] if has_trocar else None
+        p_WC = None if centres is None else centres[row]
         if k == 0:
             here, points = _search(scene, _bytes(q), _bytes(p_WT), None if p_WC is None else _bytes(p_WC))
         else:
             here = manifold.project(q, p_WT, p_WC)
             starts = (*followed, here)
             points = tuple(manifold.climb(s.q, p_WT, p_WC, tolerance_rad=tolerance_rad) for s in starts)
-        best[k] = max([here.mu, *(point.mu for point in points if manifold.inside(point))])
+        best[k] = max(
+            [float(trace["manipulability"][row]), *(point.mu for point in points if manifold.inside(point))]
+        )
         followed = _distinct(points, manifold)
     return rows, best
 
 
 def manipulability_optimality(trace: Trace) -> float:
-    """Mean over time of mu / mu*; 1 is on the optimum throughout. mu* is interpolated between its samples."""
-    rows, best = attainable_manipulability(trace, SAMPLES, _COARSE_RAD)
-    return float(np.mean(trace["manipulability"] / np.interp(np.arange(len(trace)), rows, best)))
+    """Mean over time of mu / mu*; 1 is on the optimum throughout.
+
+    The ratio is taken where mu* is known and interpolated between. A tip that moves on between two samples
+    takes mu and mu* with it: mu over an interpolated mu* can be above 1, their own ratio cannot.
+
+    Raises:
+        Undefined: If the arm is singular where self-motion is followed: it has no direction there. Or if the
+            tip is in the port all along.
+    """
+    try:
+        rows, best = attainable_manipulability(trace, samples_of(trace), _COARSE_RAD)
+    except np.linalg.LinAlgError as error:
+        raise Undefined("the arm is singular in this run: its self-motion cannot be followed") from error
+    if not rows.size:
+        raise Undefined("the tip is in the port all along: nothing says how the shaft is turned")
+    share = trace["manipulability"][rows] / best
+    return float(np.mean(np.interp(np.arange(len(trace)), rows, share)))
+
+
+def samples_of(trace: Trace) -> int:
+    """At how many ticks mu* is sought: more for a longer way of the tip, within bounds."""
+    way_m = float(np.sum(np.linalg.norm(np.diff(trace.block("tip"), axis=0), axis=1)))
+    return int(np.clip(np.ceil(way_m / _WAY_M), SAMPLES, _MOST_SAMPLES))
+
+
+def _centres(trace: Trace) -> Array | None:
+    """The shaft's points nearest to the trocar (rows, 3) [m]; None without a trocar."""
+    if trace.meta.scenario.get("trocar") is None:
+        return None
+    tip = trace.block("tip")
+    axis = trace.block("wrist") - tip
+    axis = axis / np.linalg.norm(axis, axis=1, keepdims=True)
+    centres: Array = tip + np.sum((trace.block("trocar") - tip) * axis, axis=1, keepdims=True) * axis
+    return centres
 
 
 def _distinct(points: Sequence[SelfMotionPoint], manifold: SelfMotion) -> list[SelfMotionPoint]:
@@ -105,6 +149,9 @@ def _manifold_of(scene: str) -> SelfMotion:
 METRICS = (
     Metric(
         name="manipulability_optimality",
+        heading="manipulability over the attainable, mean",
+        matters=0.01,
+        matters_source=CHOICE,
         meaning="mean of the manipulability over the largest that self-motion could reach",
         compute=manipulability_optimality,
         lower_is_better=False,

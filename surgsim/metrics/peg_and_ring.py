@@ -9,7 +9,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from surgsim.metrics.metric import Metric, with_block
+from surgsim.metrics.metric import CHOICE, FORCE_RESOLUTION, Metric, with_block
 from surgsim.trace.trace import Trace
 
 GRASPED, ON_TARGET = 1.0, 2.0
@@ -61,28 +61,37 @@ def peg_contact_force_max_n(trace: Trace) -> float:
 METRICS = (
     Metric(
         name="rings_transferred",
+        heading="rings transferred",
         meaning="rings that rest on a target peg at the end",
         compute=_of_board(rings_transferred),
         lower_is_better=False,
     ),
     Metric(
         name="rings_transferred_fraction",
+        heading="rings transferred, share",
         meaning="the same over the number of rings",
         compute=_of_board(rings_transferred_fraction),
         lower_is_better=False,
     ),
     Metric(
         name="transfer_time_s",
+        heading="time for a ring, mean [s]",
+        matters=0.1,
+        matters_source=CHOICE,
         meaning="mean time from a ring's first grasp until it rests on its target peg",
         compute=_of_board(transfer_time_s),
     ),
     Metric(
         name="ring_drops",
+        heading="rings dropped",
         meaning="rings that slipped out of the jaws, or were let go and came to rest on no peg",
         compute=_of_board(ring_drops),
     ),
     Metric(
         name="peg_contact_force_max_n",
+        heading="force on the jaws, largest [N]",
+        matters=0.05,
+        matters_source=FORCE_RESOLUTION,
         meaning="largest force of board, pegs and rings on the jaws",
         compute=_of_board(peg_contact_force_max_n),
     ),

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from surgsim.metrics.metric import Metric
+from surgsim.metrics.metric import CHOICE, Metric
 from surgsim.trace.trace import Trace
 
 
@@ -52,6 +52,9 @@ def tip_sparc(trace: Trace) -> float:
 METRICS = (
     Metric(
         name="sparc",
+        heading="spectral arc length of the tip's speed",
+        matters=0.1,
+        matters_source=CHOICE,
         meaning="spectral arc length of the tip's speed, 0 is smoothest",
         compute=tip_sparc,
         lower_is_better=False,

@@ -3,7 +3,7 @@
 import numpy as np
 
 from surgsim.metrics.force import largest
-from surgsim.metrics.metric import Metric
+from surgsim.metrics.metric import FORCE_RESOLUTION, REPEATABILITY, Metric
 from surgsim.trace.trace import Trace
 
 
@@ -16,23 +16,33 @@ def stop_distance_mm(trace: Trace) -> float:
 METRICS = (
     Metric(
         name="infeasible_ticks",
+        heading="ticks without a command",
         meaning="ticks in which the controller found no command",
         compute=lambda trace: float(np.sum(trace["infeasible"] == 1.0)),
     ),
     Metric(
         name="stop_distance_mm",
+        heading="distance until stopped [mm]",
+        matters=0.1,
+        matters_source=REPEATABILITY,
         meaning="how far the tip went from where it was when the run was stopped",
         compute=stop_distance_mm,
         whole=True,
     ),
     Metric(
         name="stop_trocar_force_max_n",
+        heading="force on the wall while stopping, largest [N]",
+        matters=0.05,
+        matters_source=FORCE_RESOLUTION,
         meaning="largest force on the abdominal wall from the stop on",
         compute=lambda trace: largest(trace.stop(), "trocar_force"),
         whole=True,
     ),
     Metric(
         name="stop_tip_force_max_n",
+        heading="force on the tip while stopping, largest [N]",
+        matters=0.05,
+        matters_source=FORCE_RESOLUTION,
         meaning="largest force on the tip from the stop on",
         compute=lambda trace: largest(trace.stop(), "tip_force"),
         whole=True,

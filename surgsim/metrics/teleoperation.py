@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from surgsim.metrics.accuracy import rms
 from surgsim.metrics.force import largest
-from surgsim.metrics.metric import Metric, with_block
+from surgsim.metrics.metric import CHOICE, FORCE_RESOLUTION, REPEATABILITY, Metric, with_block
 from surgsim.trace.trace import Trace
 
 Array = NDArray[np.float64]
@@ -138,48 +138,75 @@ def _answered(values: Array) -> Array:
 METRICS = (
     Metric(
         name="velocity_error_rms_mm_per_s",
+        heading="velocity error, RMS [mm/s]",
+        matters=0.1,
+        matters_source=CHOICE,
         meaning="RMS of tip velocity less the command that acts now, while no constraint is active",
         compute=_teleoperated(lambda trace: 1e3 * velocity_error(trace, "velocity_command")),
     ),
     Metric(
         name="velocity_error_unaligned_rms_mm_per_s",
+        heading="velocity error with the delay, RMS [mm/s]",
+        matters=0.1,
+        matters_source=CHOICE,
         meaning="the same against what the master does now: the channel's delay included",
         compute=_teleoperated(lambda trace: 1e3 * velocity_error(trace, "velocity_issued")),
     ),
     Metric(
         name="tank_min_j",
+        heading="energy in the tanks, lowest [J]",
+        matters=1e-3,
+        matters_source=CHOICE,
         meaning="lowest level of the two energy tanks",
         compute=_teleoperated(_tank_min),
         lower_is_better=False,
     ),
     Metric(
         name="delivered_max_j",
+        heading="energy delivered, largest [J]",
+        matters=1e-3,
+        matters_source=CHOICE,
         meaning="largest net energy that hand and surroundings got; above 0 is active behaviour",
         compute=_teleoperated(lambda trace: float(np.max(trace["delivered_j"]))),
     ),
     Metric(
         name="energy_residual_j",
+        heading="energy not explained, largest [J]",
+        matters=1e-3,
+        matters_source=CHOICE,
         meaning="largest energy that the ledger of the whole system does not explain",
         compute=_teleoperated(lambda trace: float(np.max(energy_residual(trace)))),
     ),
     Metric(
         name="energy_residual_fraction",
+        heading="energy not explained, share",
+        matters=0.01,
+        matters_source=CHOICE,
         meaning="the same over the energy exchanged with operator and surroundings",
         compute=_teleoperated(_residual_fraction),
     ),
     Metric(
         name="master_force_max_n",
+        heading="force on the hand, largest [N]",
+        matters=0.05,
+        matters_source=FORCE_RESOLUTION,
         meaning="largest force rendered at the master's handle",
         compute=_of("master_force", lambda trace: largest(trace, "master_force")),
         lower_is_better=None,
     ),
     Metric(
         name="plane_overshoot_max_mm",
+        heading="distance past a virtual wall, largest [mm]",
+        matters=0.1,
+        matters_source=REPEATABILITY,
         meaning="how far the tip got past a virtual wall",
         compute=_teleoperated(lambda trace: 1e3 * plane_overshoot(trace)),
     ),
     Metric(
         name="slack_rms_mm_per_s",
+        heading="tip velocity given up, RMS [mm/s]",
+        matters=0.1,
+        matters_source=CHOICE,
         meaning="RMS of the tip velocity that the controller gave up",
         compute=_of(
             "slack", lambda trace: 1e3 * rms(_answered(np.linalg.norm(trace.block("slack"), axis=1)))
@@ -188,22 +215,30 @@ METRICS = (
     ),
     Metric(
         name="passivity_active_fraction",
+        heading="ticks limited by the energy budget, share",
+        matters=0.01,
+        matters_source=CHOICE,
         meaning="fraction of ticks in which the energy budget limits the tip",
         compute=_of("passivity_active", lambda trace: float(np.mean(_answered(trace["passivity_active"])))),
         lower_is_better=None,
     ),
     Metric(
         name="relaxed_ticks",
+        heading="ticks with relaxed bounds",
         meaning="ticks in which the acceleration bounds gave way to hard rows",
         compute=_of("qp_relaxed", lambda trace: float(np.sum(_answered(trace["qp_relaxed"])))),
     ),
     Metric(
         name="goals_missed",
+        heading="goals missed",
         meaning="goals that the operator gave up",
         compute=_teleoperated(lambda trace: float(trace["goals_missed"][-1])),
     ),
     Metric(
         name="task_time_s",
+        heading="time for the task [s]",
+        matters=0.1,
+        matters_source=CHOICE,
         meaning="time after which the operator had done with all goals",
         compute=_teleoperated(task_time),
     ),

@@ -68,6 +68,15 @@ def robot_names() -> list[str]:
     return sorted(get_args(RobotName))
 
 
+def robot_description(name: str) -> str:
+    """One line about a robot, from its model.
+
+    Raises:
+        SurgsimError: If there is no such robot.
+    """
+    return str(robot_spec(name, drawn=False).text("description").data)
+
+
 def robot_spec(name: str, dh_variant: str = "standard", *, drawn: bool = True) -> mujoco.MjSpec:
     """The arm alone, its base at the origin; `literal` moves link 3 along the axis of joint 2 by d2 = 0.2 m.
 

@@ -1,5 +1,6 @@
 """A trace as a table for other tools: Parquet or CSV, one row per control tick."""
 
+import os
 from collections.abc import Callable
 from pathlib import Path
 
@@ -7,13 +8,11 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from surgsim.errors import SurgsimError
-from surgsim.recording.files import replacing
+from surgsim.recording.files import replacing, write_file
 from surgsim.trace.trace import Trace
 
-_ROWS_PER_WRITE = 4096
 
-
-def export(trace: Trace, path: Path) -> None:
+def export(trace: Trace, path: str | os.PathLike[str]) -> None:
     """Write the columns of `trace`, in SI units that their names end with.
 
     Parquet carries each column's unit in its field's metadata and the run's meta data (JSON) in the schema's,
@@ -27,9 +26,10 @@ def export(trace: Trace, path: Path) -> None:
     Raises:
         SurgsimError: If the suffix is another one, or the file cannot be written.
     """
-    check_export(path)
-    with replacing(path) as temporary:
-        _WRITERS[path.suffix.lower()](trace, temporary)
+    file = Path(path)
+    check_export(file)
+    with replacing(file) as temporary:
+        write_file(temporary, _ENCODERS[file.suffix.lower()](trace))
 
 
 def check_export(path: Path) -> None:
@@ -38,13 +38,13 @@ def check_export(path: Path) -> None:
     Raises:
         SurgsimError: If its suffix is another one.
     """
-    if path.suffix.lower() not in _WRITERS:
+    if path.suffix.lower() not in _ENCODERS:
         raise SurgsimError(
-            f"{path}: cannot export to '{path.suffix}'. Allowed: {', '.join(sorted(_WRITERS))}."
+            f"{path}: cannot export to '{path.suffix}'. Allowed: {', '.join(sorted(_ENCODERS))}."
         )
 
 
-def _write_parquet(trace: Trace, path: Path) -> None:
+def _parquet(trace: Trace) -> bytes:
     units = [block.unit for block in trace.blocks for _ in block.columns]
     fields = [
         pa.field(name, pa.float64(), metadata={"unit": unit or "1"})
@@ -52,15 +52,14 @@ def _write_parquet(trace: Trace, path: Path) -> None:
     ]
     schema = pa.schema(fields, metadata={"surgsim.trace_meta": trace.meta.to_json()})
     table = pa.Table.from_arrays([pa.array(trace[name]) for name in trace.columns], schema=schema)
-    pq.write_table(table, path, compression="zstd")
+    content = pa.BufferOutputStream()
+    pq.write_table(table, content, compression="zstd")
+    return bytes(content.getvalue())
 
 
-def _write_csv(trace: Trace, path: Path) -> None:
-    with path.open("w", encoding="ascii", newline="") as stream:
-        stream.write(",".join(trace.columns) + "\n")
-        for first in range(0, len(trace), _ROWS_PER_WRITE):
-            rows = trace.data[first : first + _ROWS_PER_WRITE].tolist()
-            stream.writelines(",".join("" if x != x else repr(x) for x in row) + "\n" for row in rows)
+def _csv(trace: Trace) -> bytes:
+    rows = (",".join("" if x != x else repr(x) for x in row.tolist()) for row in trace.data)
+    return "\n".join((",".join(trace.columns), *rows, "")).encode("ascii")
 
 
-_WRITERS: dict[str, Callable[[Trace, Path], None]] = {".parquet": _write_parquet, ".csv": _write_csv}
+_ENCODERS: dict[str, Callable[[Trace], bytes]] = {".parquet": _parquet, ".csv": _csv}

@@ -6,20 +6,17 @@ process. A program of its own keeps that away from the caller.
 
 import json
 import sys
-from collections.abc import Mapping
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pyarrow as pa
 from rerun.chunk import RrdReader
 
-from surgsim.columns import Block
 from surgsim.errors import RecordingError
-from surgsim.recording.layout import APPLICATION, HEADER, SERIES, TIMELINE, Header, series_path, timestamps
+from surgsim.recording.encoding import decode
+from surgsim.recording.layout import APPLICATION, COLUMNS, HEADER, SEAL, Header, check_version, seal
 from surgsim.trace.trace import Array
-
-_SCALARS = "Scalars:scalars"
 
 
 def main(file: Path) -> None:
@@ -37,75 +34,59 @@ def extract(file: Path) -> tuple[dict[str, str], Array]:
     """The header's texts, and all columns (rows, columns).
 
     Raises:
-        RecordingError: If rerun cannot read the file, or it is not whole.
+        RecordingError: If rerun cannot read the file, or it does not hold what was written.
     """
-    chunks = _chunks(file)
     try:
-        texts = _texts(chunks)
-        return texts, _columns(chunks, Header.from_texts(texts))
+        texts, packed = _header(_batches(file))
+        sha256 = texts.pop(SEAL, None)
+        if packed is None or seal(packed, texts) != sha256:
+            raise ValueError("damaged recording: it does not hold what was written")
+        header = Header.from_texts(texts)
+        width = sum(len(block.columns) for block in header.blocks)
+        return texts, decode(packed, header.rows, width)
     except (ValueError, pa.ArrowException) as error:
         raise RecordingError(f"{file}: {error}") from error
 
 
-def _chunks(file: Path) -> dict[str, list[pa.RecordBatch]]:
-    """Record batches of the header and the series, by entity."""
-    wanted: dict[str, list[pa.RecordBatch]] = {}
+def _batches(file: Path) -> list[pa.RecordBatch]:
+    """Record batches of the header."""
     try:
         reader = RrdReader(file)
         ids = [entry.application_id for entry in reader.recordings()]
-        if ids == [APPLICATION]:
-            for chunk in reader.stream().filter(content=[f"/{HEADER}", f"/{SERIES}/**"]):
-                batch = chunk.to_record_batch()
-                batch.validate(full=True)
-                wanted.setdefault(chunk.entity_path.lstrip("/"), []).append(batch)
+        chunks = list(reader.stream().filter(content=[f"/{HEADER}"])) if ids == [APPLICATION] else []
+        batches = [chunk.to_record_batch() for chunk in chunks]
+        for batch in batches:
+            batch.validate(full=True)
     except (OSError, ValueError, RuntimeError, pa.ArrowException) as error:
         reason = " ".join(str(error).split())[:200]
         raise RecordingError(f"{file}: damaged recording: {reason}") from error
     if ids != [APPLICATION]:
         found = ", ".join(ids) or "nothing"
         raise RecordingError(f"{file}: not a recording of one surgsim run, but of {found}")
-    return wanted
+    return batches
 
 
-def _texts(chunks: Mapping[str, list[pa.RecordBatch]]) -> dict[str, str]:
-    """The header's texts."""
+def _header(batches: Sequence[pa.RecordBatch]) -> tuple[dict[str, str], bytes | None]:
+    """The header's texts, and the packed columns if it has them.
+
+    Raises:
+        ValueError: If there is no header, or it is of another version.
+    """
     texts: dict[str, str] = {}
-    for batch in chunks.get(HEADER, []):
+    packed: bytes | None = None
+    for batch in batches:
         for name, column in zip(batch.schema.names, batch.columns, strict=True):
             value = column[-1].as_py() if len(column) else None
-            if isinstance(value, list) and len(value) == 1 and isinstance(value[0], str):
+            if not (isinstance(value, list) and len(value) == 1):
+                continue
+            if name == COLUMNS and isinstance(value[0], bytes):
+                packed = value[0]
+            elif isinstance(value[0], str):
                 texts[name] = value[0]
     if not texts:
         raise ValueError("damaged recording: its header is missing")
-    return texts
-
-
-def _columns(chunks: Mapping[str, list[pa.RecordBatch]], header: Header) -> Array:
-    """All columns (rows, columns).
-
-    Raises:
-        ValueError: If rows are missing or blocks are not of the same times.
-    """
-    parts = [_block(chunks.get(series_path(block.name), []), block, header.rows) for block in header.blocks]
-    data = np.hstack([values for values, _ in parts])
-    expected = timestamps(data[:, 0])
-    if not all(np.array_equal(times, expected) for _, times in parts):
-        raise ValueError("damaged recording: its columns are not of the same times")
-    return data
-
-
-def _block(batches: list[pa.RecordBatch], block: Block, rows: int) -> tuple[Array, Any]:
-    """Values (rows, width) and times (rows,) of a block, in order of time."""
-    batches = [batch for batch in batches if len(batch) and {TIMELINE, _SCALARS} <= {*batch.schema.names}]
-    batches.sort(key=lambda batch: batch.column(TIMELINE)[0].value)
-    width, found = len(block.columns), sum(len(batch) for batch in batches)
-    if found != rows or not batches:
-        raise ValueError(f"damaged recording: {found} of {rows} rows of '{block.name}'")
-    times = np.concatenate([np.asarray(batch.column(TIMELINE)) for batch in batches])
-    values = np.concatenate([np.asarray(batch.column(_SCALARS).flatten()) for batch in batches])
-    if values.dtype != np.float64 or values.size != rows * width:
-        raise ValueError(f"damaged recording: '{block.name}' is not {rows} rows of {width} numbers")
-    return values.reshape(rows, width), times
+    check_version(texts)
+    return texts, packed
 
 
 if __name__ == "__main__":

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import BinaryIO
 
 from surgsim.errors import RecordingError
+from surgsim.recording.contents import check_contents
 from surgsim.recording.layout import FILE_NAME
 
 _MAGIC = b"RRF2"
@@ -20,11 +21,13 @@ _END = 0
 
 
 def recording_file(path: Path) -> Path:
-    """`path` itself, or the recording in a run's folder.
+    """`path` itself, or the recording in a run's folder, all of whose files must be as they were written.
 
     Raises:
-        RecordingError: If there is no such file.
+        RecordingError: If there is no such file, or the run is damaged.
     """
+    if path.is_dir():
+        check_contents(path)
     file = path / FILE_NAME if path.is_dir() else path
     try:
         status = file.stat()

@@ -11,34 +11,49 @@ from surgsim.columns import Block
 from surgsim.trace.trace import Array, Trace, TraceMeta
 
 APPLICATION = "surgsim"
-SCHEMA_VERSION = 1
+SCHEMA_VERSION = 2
 TIMELINE = "sim_time"
 FILE_NAME = "recording.rrd"
 HEADER = "surgsim"
 SEAL = "sha256"
-SERIES = "trace"
-LIMITS = "trace_limits"  # sorts after `trace`: legends name the joints first
+COLUMNS = "columns"
+SERIES = "signals"
+LIMITS = "signal_limits"  # sorts after `signals`: legends name the joints first
 ERRORS = "errors_mm"
+KEY = "joint_key"
 SCENE = "scene"
 SUMMARY = "summary"
 LOG = "log"
 
+Durations = np.ndarray[tuple[int], np.dtype[np.timedelta64]]
+
 
 def series_path(block: str) -> str:
-    """Entity of a block of the trace, e.g. `trace/q`."""
+    """Entity at which a block of the trace is drawn, e.g. `signals/q`."""
     return f"{SERIES}/{block.strip('_')}"
 
 
-def timestamps(t_s: Array) -> np.ndarray[tuple[int], np.dtype[np.timedelta64]]:
+def timestamps(t_s: Array) -> Durations:
     """Times (n,) [s] on the recording's timeline, whole nanoseconds."""
-    times: np.ndarray[tuple[int], np.dtype[np.timedelta64]] = np.rint(1e9 * t_s).astype("timedelta64[ns]")
+    times: Durations = np.rint(1e9 * t_s).astype("timedelta64[ns]")
     return times
 
 
-def seal(data: Array, texts: Mapping[str, str]) -> str:
-    """SHA-256 of named texts and of the shape and the bytes of `data` (rows, columns)."""
-    sha = hashlib.sha256(json.dumps([data.shape, sorted(texts.items())]).encode())
-    sha.update(np.ascontiguousarray(data, dtype="<f8").tobytes())
+def check_version(texts: Mapping[str, str]) -> None:
+    """Refuse a header of another version.
+
+    Raises:
+        ValueError: If it is of one.
+    """
+    version = texts.get("schema_version")
+    if version != str(SCHEMA_VERSION):
+        raise ValueError(f"recording of schema version {version}; this surgsim reads {SCHEMA_VERSION}")
+
+
+def seal(packed: bytes, texts: Mapping[str, str]) -> str:
+    """SHA-256 of named texts and of the packed columns."""
+    sha = hashlib.sha256(json.dumps([len(packed), sorted(texts.items())]).encode())
+    sha.update(packed)
     return sha.hexdigest()
 
 
@@ -69,7 +84,7 @@ class Header:
         return {
             "schema_version": str(SCHEMA_VERSION),
             "trace_meta": self.meta.to_json(),
-            "metrics": json.dumps(dict(self.metrics), sort_keys=True),
+            "metrics": json.dumps(dict(self.metrics)),
             "layout": json.dumps({"blocks": blocks, "rows": self.rows}, sort_keys=True),
         }
 
@@ -80,9 +95,7 @@ class Header:
         Raises:
             ValueError: If the texts are not those of a header of this version.
         """
-        version = texts.get("schema_version")
-        if version != str(SCHEMA_VERSION):
-            raise ValueError(f"recording of schema version {version}; this surgsim reads {SCHEMA_VERSION}")
+        check_version(texts)
         try:
             layout = json.loads(texts["layout"])
             metrics = json.loads(texts["metrics"])

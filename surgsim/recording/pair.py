@@ -4,43 +4,39 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
-from surgsim.errors import RecordingError
-from surgsim.recording.blueprint import plot, scene_view, texts_view
-from surgsim.recording.files import replacing
-from surgsim.recording.layout import APPLICATION, ERRORS, LIMITS, TIMELINE, series_path
+from surgsim.recording.blueprint import laid_out, texts_view
+from surgsim.recording.eyes import inside_view, scene_view
+from surgsim.recording.layout import series_path
+from surgsim.recording.plots import errors_plot, joint_key, joint_plots, plot
 from surgsim.recording.read import Recorded
 from surgsim.recording.scene import log_scene, scenario_of
 from surgsim.recording.signals import log_signals
+from surgsim.recording.stream import stream_to
 from surgsim.recording.write import log_texts
-from surgsim.trace.trace import Trace
+from surgsim.trace.trace import Array, Trace
 
 _SIDES = ("a", "b")
+_MARGIN = 0.05  # above and below the signals, as a share of their range
 
 
 def write_pair(path: Path, pair: Sequence[Recorded]) -> None:
     """Write two runs into one recording, each below an entity of its own, with a layout of two columns.
 
     Raises:
-        RecordingError: If the file cannot be written whole.
+        SurgsimError: If the file cannot be written.
     """
-    stream = rr.RecordingStream(APPLICATION, send_properties=False)
     traces = [recorded.trace for recorded in pair]
-    with replacing(path) as temporary:
-        stream.save(temporary, default_blueprint=_blueprint(traces))
+    with stream_to(path, _blueprint(traces)) as stream:
         stream.send_recording_name(" | ".join(title(trace) for trace in traces))
         for side, recorded in zip(_SIDES, pair, strict=True):
             below, trace = _Below(stream, side), recorded.trace
             log_signals(below, trace)
             log_scene(below, scenario_of(trace), trace)
             log_texts(below, trace.meta, recorded.metrics)
-        try:
-            stream.flush()
-            stream.disconnect()
-        except RuntimeError as error:
-            raise RecordingError(f"{path}: cannot be written whole; is the disk full? ({error})") from error
 
 
 def title(trace: Trace) -> str:
@@ -70,25 +66,40 @@ class _Below:
 
 
 def _blueprint(traces: Sequence[Trace]) -> rrb.Blueprint:
-    columns = [_column(side, trace) for side, trace in zip(_SIDES, traces, strict=True)]
-    return rrb.Blueprint(
-        rrb.Horizontal(*columns),
-        rrb.BlueprintPanel(state="collapsed"),
-        rrb.SelectionPanel(state="collapsed"),
-        rrb.TimePanel(state="collapsed", timeline=TIMELINE),
-        auto_views=False,
-    )
+    errors = common_axis([1e3 * trace[name] for trace in traces for name in ("tip_error_m", "rcm_error_m")])
+    manipulability = common_axis([trace["manipulability"] for trace in traces])
+    columns = [
+        _column(f"{side}/", trace, errors, manipulability) for side, trace in zip(_SIDES, traces, strict=True)
+    ]
+    return laid_out(rrb.Horizontal(*columns))
 
 
-def _column(side: str, trace: Trace) -> rrb.Vertical:
+def common_axis(signals: Sequence[Array]) -> rrb.ScalarAxis | None:
+    """An axis that holds all of the signals, so that plots side by side compare; None if none is finite."""
+    finite = np.concatenate([signal[np.isfinite(signal)] for signal in signals])
+    if not finite.size:
+        return None
+    low, high = float(finite.min()), float(finite.max())
+    margin = _MARGIN * max(high - low, 1e-9)
+    return rrb.ScalarAxis(range=(low - margin, high + margin))
+
+
+def _column(
+    below: str, trace: Trace, errors: rrb.ScalarAxis | None, manipulability: rrb.ScalarAxis | None
+) -> rrb.Vertical:
     """Scene, errors, manipulability, torques and texts of one run."""
+    scenario = scenario_of(trace)
     return rrb.Vertical(
-        scene_view(scenario_of(trace), trace, below=f"{side}/", name=title(trace)),
         rrb.Horizontal(
-            plot("Tip and RCM error [mm]", f"{side}/{ERRORS}"),
-            plot("Manipulability", f"{side}/{series_path('manipulability')}"),
-            plot("Torque [N m]", f"{side}/{series_path('tau')}", f"{side}/{LIMITS}/tau"),
+            scene_view(scenario, trace, below=below, name=title(trace)),
+            inside_view(scenario, trace, below=below),
         ),
-        texts_view(f"{side}/"),
-        row_shares=[0.5, 0.3, 0.2],
+        rrb.Horizontal(
+            errors_plot(below, errors),
+            plot("Manipulability", f"{below}{series_path('manipulability')}", axis_y=manipulability),
+            joint_plots(trace, below)[-1],
+        ),
+        joint_key(below),
+        texts_view(below),
+        row_shares=[0.42, 0.27, 0.07, 0.24],
     )

@@ -16,8 +16,10 @@ from surgsim.scenario.schema import Scenario
 from surgsim.trace.trace import Array, Trace
 
 RCM_ARROW_SCALE = 20.0
+DESIRED_PATH, ACTUAL_PATH = "desired_path", "actual_path"
 _DRAWN_GROUPS = 3  # MuJoCo shows geom groups 0 to 2 and keeps collision shapes in 3
 _POINTS_PER_LINE = 2000
+_DASH_SHARE = 0.06  # length of a dash over the extent of its line
 
 
 def scenario_of(trace: Trace) -> Scenario:
@@ -142,15 +144,31 @@ def _log_pose(stream: rr.RecordingStream, path: str, t_s: Array, poses: Poses, b
 
 
 def _log_paths(stream: rr.RecordingStream, trace: Trace) -> None:
+    """Both paths; the desired one in dashes, so that the actual one on it is seen between them."""
     rows = np.unique(np.linspace(0, len(trace) - 1, _POINTS_PER_LINE).astype(np.intp))
     for name, block, color, width in (
-        ("desired_path", "tip_ref", palette.SKY, 1.8),
-        ("actual_path", "tip", palette.VERMILION, 0.8),
+        (DESIRED_PATH, "tip_ref", palette.SKY, 1.8),
+        (ACTUAL_PATH, "tip", palette.BLACK, 0.8),
     ):
         line = trace.block(block)[rows]
-        line = line[np.isfinite(line).all(axis=1)].astype(np.float32)
-        strip = rr.LineStrips3D([line], radii=rr.Radius.ui_points(width), colors=[color])
-        stream.log(f"{SCENE}/{name}", strip, static=True)
+        line = line[np.isfinite(line).all(axis=1)]
+        strips = dashes(line) if name == DESIRED_PATH else [line]
+        shown = rr.LineStrips3D(
+            [strip.astype(np.float32) for strip in strips], radii=rr.Radius.ui_points(width), colors=[color]
+        )
+        stream.log(f"{SCENE}/{name}", shown, static=True)
+
+
+def dashes(line: Array) -> list[Array]:
+    """Every other piece of `line` (n, 3) [m], each a fixed share of the line's extent long."""
+    extent = float(np.linalg.norm(np.ptp(line, axis=0))) if len(line) else 0.0
+    if extent == 0.0:
+        return [line]
+    along = np.concatenate([[0.0], np.linalg.norm(np.diff(line, axis=0), axis=1).cumsum()])
+    piece = np.floor(along / (_DASH_SHARE * extent)).astype(np.intp)
+    starts = np.flatnonzero(np.diff(piece, prepend=-1))
+    ends = np.append(starts[1:], len(line) - 1) + 1  # up to the next piece's first point
+    return [line[a:b] for a, b in zip(starts, ends, strict=True) if piece[a] % 2 == 0]
 
 
 def _log_points(

@@ -1,31 +1,54 @@
-"""The signals of a recording: every column of the trace, the errors in millimetres, and the limits."""
+"""The signals that the viewer plots: the trace's columns, the errors in millimetres, and the limits.
+
+They are for the eye: `polyline` chooses which rows are drawn. The whole trace is packed in the header.
+"""
 
 from collections.abc import Sequence
+from itertools import cycle, islice
 
 import numpy as np
 import rerun as rr
 
 from surgsim.columns import Block
 from surgsim.recording import palette
-from surgsim.recording.layout import ERRORS, LIMITS, TIMELINE, series_path, timestamps
+from surgsim.recording.layout import ERRORS, KEY, LIMITS, TIMELINE, Durations, series_path, timestamps
+from surgsim.recording.plots import groups
+from surgsim.recording.polyline import drawn_rows
 from surgsim.trace.trace import Array, Trace
 
 _SCALAR_COLORS = {
-    "manipulability_6d": palette.ORANGE,
-    "rcm_error": palette.ORANGE,
-    "saturated_joints": palette.VERMILION,
+    "manipulability_6d": [palette.ORANGE],
+    "rcm_error": [palette.ORANGE],
+    "saturated_joints": [palette.VERMILION],
 }
 
 
 def log_signals(stream: rr.RecordingStream, trace: Trace) -> None:
-    """Send every block at every control tick, then what is derived for the plots."""
-    times = [rr.TimeColumn(TIMELINE, duration=timestamps(trace["t_s"]))]
-    for block in trace.blocks:
+    """Send every block but the time, then what is derived for the plots."""
+    times = timestamps(trace["t_s"])
+    colors = series_colors(trace)
+    for block in trace.blocks[1:]:
         values = trace.block(block.name)
-        _send(stream, series_path(block.name), times, values, names=_names(block), colors=_colors(block))
+        _draw(stream, series_path(block.name), times, values, names=_names(block), colors=colors[block.name])
     errors = 1e3 * np.stack([trace["tip_error_m"], trace["rcm_error_m"]], axis=1)
-    _send(stream, ERRORS, times, errors, names=["tip", "RCM"], colors=[palette.SKY, palette.ORANGE])
+    _draw(stream, ERRORS, times, errors, names=["tip", "RCM"], colors=[palette.SKY, palette.ORANGE])
     _log_limits(stream, trace)
+    _log_key(stream)
+
+
+def _draw(
+    stream: rr.RecordingStream,
+    path: str,
+    times: Durations,
+    values: Array,
+    *,
+    names: Sequence[str],
+    colors: Sequence[tuple[int, int, int]],
+) -> None:
+    """Send those rows of `values` (rows, series) that show them."""
+    rows = drawn_rows(values)
+    columns = [rr.TimeColumn(TIMELINE, duration=times[rows])]
+    _send(stream, path, columns, values[rows], names=names, colors=colors)
 
 
 def _send(
@@ -50,10 +73,27 @@ def _names(block: Block) -> list[str]:
     return [column.removesuffix(f"_{block.unit}") for column in block.columns]
 
 
-def _colors(block: Block) -> list[tuple[int, int, int]]:
-    if len(block.labels) == 1:
-        return [_SCALAR_COLORS.get(block.name, palette.SKY)]
-    return list(palette.SEVEN[: len(block.labels)])
+def series_colors(trace: Trace) -> dict[str, list[tuple[int, int, int]]]:
+    """Colours of every block's series; those that share a plot take turns."""
+    found = {block.name: [*islice(cycle(palette.SEVEN), len(block.labels))] for block in trace.blocks}
+    found |= {name: [palette.SKY] for name, colors in found.items() if len(colors) == 1} | _SCALAR_COLORS
+    for blocks in groups(trace).values():
+        turn = cycle(palette.SEVEN)
+        found |= {block.name: [*islice(turn, len(block.labels))] for block in blocks}
+    return found
+
+
+def _log_key(stream: rr.RecordingStream) -> None:
+    """A point and a number for every joint, in its colour."""
+    joints = range(1, len(palette.SEVEN) + 1)
+    points = rr.Points2D(
+        [(joint, 0.0) for joint in joints],
+        colors=palette.SEVEN,
+        labels=[str(joint) for joint in joints],
+        radii=rr.Radius.ui_points(5.0),
+        show_labels=True,
+    )
+    stream.log(KEY, points, static=True)
 
 
 def _log_limits(stream: rr.RecordingStream, trace: Trace) -> None:

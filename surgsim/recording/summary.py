@@ -1,21 +1,18 @@
 """The text panel of a recording: how the run ended, its metrics, its scenario."""
 
 from collections.abc import Mapping
-from itertools import zip_longest
 
 from surgsim.scenario.yaml_text import dump_yaml
 from surgsim.trace.trace import TraceMeta
 
 
 def result_markdown(meta: TraceMeta, metrics: Mapping[str, float | None]) -> str:
-    """Outcome and metrics as Markdown."""
+    """Outcome, and those metrics that apply, as Markdown."""
     ending = meta.ending
     head = f"**{meta.scenario['name']}: {ending.outcome.name.lower()}.** {outcome_sentence(meta)}\n"
-    cells = [f"{name} | {_number(value)}" for name, value in metrics.items()]
-    half = (len(cells) + 1) // 2
-    rows = zip_longest(cells[:half], cells[half:], fillvalue=" | ")
-    table = ["| metric | value | metric | value |", "|---|---|---|---|", *(f"| {a} | {b} |" for a, b in rows)]
-    return "\n".join([head, *(table if cells else [])]) + "\n"
+    rows = [f"| {name} | {value:.4g} |" for name, value in metrics.items() if value is not None]
+    table = ["| metric | value |", "|---|---|", *rows]
+    return "\n".join([head, *(table if rows else [])]) + "\n"
 
 
 def scenario_markdown(meta: TraceMeta) -> str:
@@ -28,7 +25,3 @@ def outcome_sentence(meta: TraceMeta) -> str:
     ending = meta.ending
     detail = f" ({ending.detail})" if ending.detail else ""
     return f"{ending.outcome.value.removesuffix('.')}{detail}, at {ending.t_s:.3f} s."
-
-
-def _number(value: float | None) -> str:
-    return "does not apply" if value is None else f"{value:.4g}"

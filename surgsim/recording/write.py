@@ -3,15 +3,16 @@
 from collections.abc import Mapping
 from pathlib import Path
 
+import pyarrow as pa
 import rerun as rr
 
-from surgsim.errors import Outcome, RecordingError
+from surgsim.errors import Outcome
 from surgsim.recording.blueprint import blueprint
-from surgsim.recording.files import replacing
-from surgsim.recording.framing import check_framing
-from surgsim.recording.layout import APPLICATION, HEADER, LOG, SEAL, SUMMARY, TIMELINE, Header, seal
+from surgsim.recording.encoding import encode
+from surgsim.recording.layout import COLUMNS, HEADER, LOG, SEAL, SUMMARY, TIMELINE, Header, seal
 from surgsim.recording.scene import log_scene, scenario_of
 from surgsim.recording.signals import log_signals
+from surgsim.recording.stream import stream_to
 from surgsim.recording.summary import outcome_sentence, result_markdown, scenario_markdown
 from surgsim.trace.trace import Trace, TraceMeta
 
@@ -31,26 +32,20 @@ def write_recording(path: Path, trace: Trace, metrics: Mapping[str, float | None
     """
     scenario = scenario_of(trace)
     texts = Header.of(trace, metrics).to_texts()
-    sha256 = seal(trace.data, texts)
-    stream = rr.RecordingStream(APPLICATION, recording_id=sha256[:32], send_properties=False)
-    with replacing(path) as temporary:
-        stream.save(temporary, default_blueprint=blueprint(scenario, trace))
+    packed = encode(trace.data)
+    sha256 = seal(packed, texts)
+    with stream_to(path, blueprint(scenario, trace), recording_id=sha256[:32]) as stream:
         stream.send_recording_name(f"{scenario.name} · {scenario.controller.name} · seed {scenario.seed}")
-        stream.log(HEADER, rr.AnyValues(**texts, **{SEAL: sha256}), static=True)
+        log_header(stream, texts, packed, sha256)
         log_signals(stream, trace)
         log_scene(stream, scenario, trace)
         log_texts(stream, trace.meta, metrics)
-        _finish(stream, temporary, path)
 
 
-def _finish(stream: rr.RecordingStream, temporary: Path, path: Path) -> None:
-    """Flush, and make sure that the file is whole: rerun does not always say that the disk is full."""
-    try:
-        stream.flush()
-        stream.disconnect()
-        check_framing(temporary)
-    except (RuntimeError, RecordingError) as error:
-        raise RecordingError(f"{path}: cannot be written whole; is the disk full? ({error})") from error
+def log_header(stream: rr.RecordingStream, texts: Mapping[str, str], packed: bytes, sha256: str) -> None:
+    """Store what the trace is read back from, under the seal."""
+    columns = pa.array([packed], pa.large_binary())
+    stream.log(HEADER, rr.AnyValues(**texts, **{COLUMNS: columns, SEAL: sha256}), static=True)
 
 
 def log_texts(stream: rr.RecordingStream, meta: TraceMeta, metrics: Mapping[str, float | None]) -> None:

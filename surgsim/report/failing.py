@@ -6,15 +6,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from surgsim.compare.failures import WORST_RCM_MM, outcome_words
 from surgsim.compare.observations import COMPLETED, Observations
-from surgsim.metrics.accuracy import CONVERGED_RCM_M
 from surgsim.report.axes import Axis
 from surgsim.report.results import parameters_of
 
 Array = NDArray[np.float64]
-
-WORST_RCM_MM = 1e3 * CONVERGED_RCM_M
-"""Largest RCM error of a run that counts as done [mm]; the convergence time's bound of the shaft."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -58,7 +55,7 @@ def at_level(runs: Observations) -> AtLevel:
     return AtLevel(
         runs=len(runs),
         failed=sum(ends.values()),
-        outcomes=", ".join(ends),
+        outcomes=", ".join(map(outcome_words, ends)),
         rcm_max_mm=float(np.nanmax(errors)) if np.isfinite(errors).any() else float("nan"),
     )
 

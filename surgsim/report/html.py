@@ -60,9 +60,12 @@ def figures(*drawings: str) -> str:
     return f'<div class="figures{wide}">{"".join(there)}</div>' if there else ""
 
 
-def details(summary: str, *parts: str) -> str:
-    """Parts that unfold."""
-    return f"<details><summary>{escape(summary)}</summary>{''.join(parts)}</details>"
+def details(summary: str, *parts: str, printed: bool = False, small: str = "", anchor: str = "") -> str:
+    """Parts that unfold; `printed` ones do so on paper by themselves, `small` is said beside the summary."""
+    attributes = (' class="print"' if printed else "") + (f' id="{escape(anchor)}"' if anchor else "")
+    beside = f" <small>{escape(small)}</small>" if small else ""
+    body = "".join(part for part in parts if part)
+    return f"<details{attributes}><summary>{escape(summary)}{beside}</summary>{body}</details>"
 
 
 def legend(names: Sequence[str]) -> str:

@@ -1,5 +1,5 @@
 "use strict";
-// Sorts the leaderboard: best first, then reversed; rows without a value stay at the end.
+// Sorts a table of the leaderboard: best first, then reversed; rows without a value stay at the end.
 for (const button of document.querySelectorAll(".board th button")) {
   button.addEventListener("click", () => {
     const heading = button.closest("th");
@@ -21,6 +21,22 @@ for (const button of document.querySelectorAll(".board th button")) {
     });
     body.append(...rows);
     for (const th of heading.parentElement.cells) th.setAttribute("aria-sort", th === heading ? order : "none");
-    document.getElementById("sorted").textContent = `Sorted by ${button.dataset.name}, ${order}.`;
+    document.getElementById("sorted").textContent = `Sorted by ${button.dataset.words}, ${order}.`;
   });
 }
+// Unfolds what a link leads to, and for paper what is to be printed.
+const unfold = () => {
+  const target = document.getElementById(decodeURIComponent(location.hash.slice(1)));
+  for (let e = target; e; e = e.parentElement) if (e.tagName === "DETAILS") e.open = true;
+  if (target && target.tagName === "DETAILS") target.scrollIntoView();
+};
+addEventListener("hashchange", unfold);
+unfold();
+let unfolded = [];
+addEventListener("beforeprint", () => {
+  unfolded = [...document.querySelectorAll("details.print:not([open])")];
+  for (const e of unfolded) e.open = true;
+});
+addEventListener("afterprint", () => {
+  for (const e of unfolded) e.open = false;
+});

@@ -51,6 +51,11 @@ class Results:
     suite: Mapping[str, Any]
 
     @property
+    def name(self) -> str:
+        """What the batch is called."""
+        return str(self.suite.get("name") or self.folder.resolve().name)
+
+    @property
     def metrics(self) -> list[str]:
         """Metrics that any completed run has."""
         return [name for name in METRICS if np.isfinite(self.runs.values(name)).any()]
@@ -66,20 +71,26 @@ class Results:
         return [name for name in _SHOWN if name in self.metrics]
 
 
-def read_results(folder: Path) -> Results:
+def read_results(folder: Path, matters: Mapping[str, float] | None = None) -> Results:
     """Read the results folder of a batch.
+
+    Args:
+        folder: The folder.
+        matters: Smallest differences that matter, by metric, instead of the suite's.
 
     Raises:
         SurgsimError: If there is no table, it is damaged or empty, or `suite.json` cannot be read.
     """
     if not folder.is_dir():
         raise SurgsimError(f"{folder} is not a folder; give the one that `surgsim compare` wrote")
-    table = read_table(folder)
+    table, suite = read_table(folder), _suite(folder / "suite.json")
+    told = suite.get("matters")
+    smallest = {**(told if isinstance(told, Mapping) else {}), **(matters or {})}
     try:
-        runs = Observations.of(table)
+        runs = Observations.of(table, smallest)
     except SurgsimError as error:
         raise SurgsimError(f"{folder / 'runs.parquet'}: {error}") from error
-    return Results(folder=folder, rows=table.to_pylist(), runs=runs, suite=_suite(folder / "suite.json"))
+    return Results(folder=folder, rows=table.to_pylist(), runs=runs, suite=suite)
 
 
 def _suite(path: Path) -> Mapping[str, Any]:

@@ -1,11 +1,13 @@
 """Writing the report."""
 
-from collections.abc import Callable
+import os
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
-from surgsim.recording.files import replacing
+from surgsim.recording.files import replacing, write_file
 from surgsim.report.page import page
 from surgsim.report.results import read_results
+from surgsim.report.scenes import scenes_of
 from surgsim.report.series import read_series
 
 NAME = "report.html"
@@ -15,13 +17,19 @@ def _silent(_: str) -> None:
     """Say nothing."""
 
 
-def write_report(folder: Path, out: Path | None = None, say: Callable[[str], None] = _silent) -> Path:
+def write_report(
+    folder: str | os.PathLike[str],
+    out: str | os.PathLike[str] | None = None,
+    say: Callable[[str], None] = _silent,
+    matters: Mapping[str, float] | None = None,
+) -> Path:
     """Write the report of the batch in `folder`, whole or not at all.
 
     Args:
         folder: Results folder of `surgsim compare`.
         out: File to write; `report.html` in the folder if None.
         say: Told what takes long.
+        matters: Smallest differences that matter, by metric, instead of the suite's.
 
     Returns:
         The file.
@@ -29,10 +37,11 @@ def write_report(folder: Path, out: Path | None = None, say: Callable[[str], Non
     Raises:
         SurgsimError: If there are no results, they are damaged, or the disk refuses.
     """
-    results = read_results(folder)
-    file = out if out is not None else folder / NAME
-    series = read_series(folder, results.rows, results.runs.scenarios, say)
-    text = page(results, series, file)
+    root = Path(folder)
+    results = read_results(root, matters)
+    file = root / NAME if out is None else Path(out)
+    series = read_series(root, results.rows, results.runs.scenarios, say)
+    text = page(results, series, scenes_of(results), file)
     with replacing(file) as draft:
-        draft.write_text(text, encoding="utf-8")
+        write_file(draft, text)
     return file

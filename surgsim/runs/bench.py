@@ -2,9 +2,9 @@
 
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from time import perf_counter
 from typing import Any
 
+from surgsim.compiled.watch import working_time
 from surgsim.errors import SurgsimError
 from surgsim.metrics.catalog import compute_metrics
 from surgsim.recording.write import write_recording
@@ -41,13 +41,13 @@ def _once(controller: str, duration_s: float) -> dict[str, Any]:
     ]
     scenario = load_scenario(_SCENARIO, controller=controller, assignments=settings)
     setup = prepare(scenario)
-    began = perf_counter()
+    began = working_time()
     trace = Simulation(setup).run()
-    simulated = perf_counter()
+    simulated = working_time()
     metrics = compute_metrics(trace)
     with TemporaryDirectory() as folder:
         write_recording(Path(folder) / "recording.rrd", trace, metrics)
-    ended = perf_counter()
+    ended = working_time()
     return {
         "controller": controller,
         "real_time_factor": duration_s / (ended - began),

@@ -1,27 +1,32 @@
-"""A run's folder: `scenario.yaml`, `metrics.json` and `recording.rrd`, renamed into place when whole."""
+"""A run's folder: `scenario.yaml`, `metrics.json` and `recording.rrd`, put into place when whole."""
 
 import json
 import os
-import shutil
-import tempfile
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import cached_property
 from hashlib import sha256
 from pathlib import Path
-from time import perf_counter
 from typing import Any
 
+from surgsim.compiled.watch import working_time
 from surgsim.errors import SurgsimError
-from surgsim.metrics.catalog import compute_metrics
+from surgsim.metrics.catalog import evaluate
+from surgsim.recording.contents import SUMMARY, contents_of
+from surgsim.recording.files import write_file
+from surgsim.recording.folders import make_folder, sync_tree
 from surgsim.recording.sealed import sealed
-from surgsim.runs.provenance import provenance
+from surgsim.runs.drafts import draft_of
+from surgsim.runs.exchange import put_in_place, restore
+from surgsim.runs.provenance import provenance_of
 from surgsim.scenario.schema import Scenario
 from surgsim.scenario.yaml_text import dump_yaml
 from surgsim.simulate.loop import Progress, simulate
 from surgsim.trace.trace import Trace
+from surgsim.verdict import Verdict, judge
 
-SCHEMA_VERSION = 1
+SCHEMA_VERSION = 2
 RUN_FILES = frozenset({"scenario.yaml", "metrics.json", "recording.rrd"})
 
 
@@ -32,12 +37,19 @@ class RunResult:
     Attributes:
         trace: Its trace.
         metrics: Its metrics; None where a metric is not defined.
-        wall_time_s: Wall time of the simulation alone [s].
+        wall_time_s: Wall time of the simulation alone [s], without what compiling kernels took.
+        undefined: Why, for each metric that could not be computed.
     """
 
     trace: Trace
     metrics: Mapping[str, float | None]
     wall_time_s: float
+    undefined: Mapping[str, str] = field(default_factory=dict)
+
+    @cached_property
+    def verdict(self) -> Verdict:
+        """Whether its task was done, and the thresholds that it is held against."""
+        return judge(self.trace, self.metrics)
 
     @property
     def real_time_factor(self) -> float:
@@ -50,11 +62,14 @@ def run_to_folder(
 ) -> RunResult:
     """Run `scenario` and write its folder.
 
+    A run that is there is replaced in one step: a reader finds the old run or the new one, at every moment.
+
     Raises:
         SurgsimError: If the scenario cannot be started, or the folder cannot be written.
     """
     check_target(folder)
     result = execute(scenario, progress)
+    check_target(folder)  # it may have been filled meanwhile
     write_run(scenario, result, folder, record=record)
     return result
 
@@ -65,10 +80,15 @@ def execute(scenario: Scenario, progress: Progress | None = None) -> RunResult:
     Raises:
         SurgsimError: If the scenario cannot be started.
     """
-    began = perf_counter()
+    began = working_time()
     trace = simulate(scenario, progress)
-    wall = perf_counter() - began
-    return RunResult(trace=trace, metrics=compute_metrics(trace), wall_time_s=wall)
+    return result_of(trace, working_time() - began)
+
+
+def result_of(trace: Trace, wall_time_s: float) -> RunResult:
+    """A finished run with its metrics; one that cannot be computed is None and has its reason."""
+    found = evaluate(trace)
+    return RunResult(trace=trace, metrics=found.values, wall_time_s=wall_time_s, undefined=found.undefined)
 
 
 def write_run(
@@ -80,22 +100,22 @@ def write_run(
         SurgsimError: If the folder cannot be written.
     """
     with whole_folder(folder) as draft:
-        outcome = result.trace.meta.ending.to_dict()
-        summary = summary_of(scenario, outcome, result.metrics, result.wall_time_s)
+        summary = summary_of_result(scenario, result)
         if operator_input is not None:
             summary["provenance"]["operator_input_sha256"] = sha256(operator_input.encode()).hexdigest()
-            (draft / "operator_input.csv").write_text(operator_input)
-        write_summary(draft, scenario, summary)
+            write_file(draft / "operator_input.csv", operator_input)
         if record:
             from surgsim.recording.write import write_recording  # rerun takes a second to import
 
             write_recording(draft / "recording.rrd", result.trace, result.metrics)
+        write_summary(draft, scenario, summary)
 
 
 def write_summary(draft: Path, scenario: Scenario, summary: Mapping[str, Any]) -> None:
-    """Write `scenario.yaml` and `metrics.json` into a folder that is being made."""
-    (draft / "scenario.yaml").write_text(dump_yaml(scenario.resolved()))
-    (draft / "metrics.json").write_text(json.dumps(sealed(summary), indent=2) + "\n")
+    """Write `scenario.yaml`, then `metrics.json` with size and hash of every file in the draft."""
+    write_file(draft / "scenario.yaml", dump_yaml(scenario.resolved()))
+    whole = sealed({**summary, "files": contents_of(draft)})
+    write_file(draft / SUMMARY, json.dumps(whole, indent=2) + "\n")
 
 
 def check_target(folder: Path) -> None:
@@ -115,39 +135,47 @@ def check_target(folder: Path) -> None:
 def whole_folder(folder: Path) -> Iterator[Path]:
     """A temporary sibling to write into; it takes the place of `folder` when the block ends well.
 
+    It does so in one step, and once all its files are on the disk. Any number of processes may write the same
+    folder: the last one stays, whole.
+
     Raises:
         SurgsimError: If the disk refuses.
     """
-    draft: Path | None = None
+    place = Path(os.path.realpath(folder))  # a link stays, and what it points to is replaced
     try:
-        folder.parent.mkdir(parents=True, exist_ok=True)
-        draft = Path(tempfile.mkdtemp(prefix=f".{folder.name}.", suffix=".part", dir=folder.parent))
-        draft.chmod(0o755)
-        yield draft
-        if folder.exists():
-            old = Path(tempfile.mkdtemp(prefix=f".{folder.name}.", suffix=".old", dir=folder.parent))
-            os.rename(folder, old / folder.name)
-            os.rename(draft, folder)
-            shutil.rmtree(old)
-        else:
-            os.rename(draft, folder)
+        make_folder(place.parent)
+        restore(place)
+        with draft_of(place) as draft:
+            yield draft
+            sync_tree(draft)
+            put_in_place(draft, place)
     except OSError as error:
         raise SurgsimError(f"cannot write {folder}: {error.strerror or error}") from error
-    finally:
-        if draft is not None and draft.exists():
-            shutil.rmtree(draft, ignore_errors=True)
+
+
+def summary_of_result(scenario: Scenario, result: RunResult) -> dict[str, Any]:
+    """The content of `metrics.json` of a finished run."""
+    outcome = result.trace.meta.ending.to_dict()
+    return summary_of(scenario, outcome, result.verdict, result.metrics, result.wall_time_s, result.undefined)
 
 
 def summary_of(
-    scenario: Scenario, outcome: Mapping[str, Any], metrics: Mapping[str, float | None], wall_s: float
+    scenario: Scenario,
+    outcome: Mapping[str, Any],
+    verdict: Verdict,
+    metrics: Mapping[str, float | None],
+    wall_s: float,
+    undefined: Mapping[str, str] | None = None,
 ) -> dict[str, Any]:
-    """The content of `metrics.json`."""
+    """The content of `metrics.json`; `undefined` says why, for each metric that could not be computed."""
     return {
         "schema_version": SCHEMA_VERSION,
         "scenario": scenario.name,
         "controller": scenario.controller.name,
         "seed": scenario.seed,
         "outcome": dict(outcome),
+        **verdict.to_dict(),
         "metrics": dict(metrics),
-        "provenance": {**provenance(), "scenario_sha256": scenario.sha256(), "wall_time_s": round(wall_s, 6)},
+        "undefined": dict(undefined or {}),
+        "provenance": {**provenance_of(scenario), "wall_time_s": round(wall_s, 6)},
     }

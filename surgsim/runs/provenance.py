@@ -1,33 +1,69 @@
-"""Where a result comes from: versions, machine, commit."""
+"""Where a result comes from: versions, sources, machine, commit."""
 
 import hashlib
+import json
 import os
 import platform
 import subprocess
+from collections.abc import Mapping
 from functools import lru_cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
 import surgsim
+from surgsim.runs.plugins import plugins_of, policies_of
+from surgsim.runs.sources import LATER_ROOMS, ROOT, sources_sha256
+from surgsim.scenario.schema import Scenario
 
 _PACKAGES = ("mujoco", "numpy", "scipy", "mink", "daqp", "qpsolvers", "osqp", "rerun-sdk")
-_THAT_COUNT = ("surgsim", "assets", "scenarios", "pyproject.toml")
+_OF_NO_CONSEQUENCE = frozenset({"rerun-sdk"})
+_THAT_COUNT = ("surgsim/*.py", "assets", *(f":(exclude)surgsim/{room}" for room in LATER_ROOMS))
 
 
 @lru_cache(maxsize=1)
 def provenance() -> dict[str, Any]:
-    """Versions of surgsim, Python and the numerical packages, the machine, and the checkout's commit.
+    """Versions of surgsim, Python and the numerical packages, the machine, the sources and their commit.
 
-    Found once a process: git takes longer than a short run.
+    Found once a process: git takes longer than a short run. The hash of the sources tells which code it is
+    where there is no git, or where git refuses.
     """
     return {
         "surgsim": surgsim.__version__,
         "python": platform.python_version(),
         "packages": {name: found for name in _PACKAGES if (found := _version(name))},
         "machine": f"{platform.system()} {platform.machine()}",
-        "commit": _commit(),
+        "sources_sha256": sources_sha256(),
+        "commit": commit_of(ROOT.parent),
     }
+
+
+def provenance_of(scenario: Scenario) -> dict[str, Any]:
+    """Provenance of a run of `scenario`: as `provenance`, with the packages that gave it a part.
+
+    `code_sha256` is one hash of all that a result follows from beside its scenario: the sources of surgsim
+    and of these packages, the policy's file, the versions of the numerical packages.
+    """
+    told = {**provenance(), "plugins": plugins_of(scenario), "policies": policies_of(scenario)}
+    return {**told, "code_sha256": _code_sha256(told), "scenario_sha256": scenario.sha256()}
+
+
+def _code_sha256(told: Mapping[str, Any]) -> str:
+    packages = {name: told["packages"][name] for name in told["packages"] if name not in _OF_NO_CONSEQUENCE}
+    code = [told["sources_sha256"], packages, told["plugins"], told["policies"]]
+    return hashlib.sha256(json.dumps(code, sort_keys=True).encode()).hexdigest()
+
+
+def code_difference(old: Mapping[str, Any], new: Mapping[str, Any]) -> str:
+    """What of the code of two runs is different, in words: `sources of surgsim, mujoco 4.0.0 not 4.0.1`."""
+    words = [] if old["sources_sha256"] == new["sources_sha256"] else ["sources of surgsim"]
+    before, now = old["packages"], new["packages"]
+    names = sorted((before.keys() | now.keys()) - _OF_NO_CONSEQUENCE)
+    words += [f"{n} {before.get(n)} not {now.get(n)}" for n in names if before.get(n) != now.get(n)]
+    for kind, word in (("plugins", "package"), ("policies", "policy")):
+        names = sorted(old[kind].keys() | new[kind].keys())
+        words += [f"{word} {name}" for name in names if old[kind].get(name) != new[kind].get(name)]
+    return ", ".join(words)
 
 
 def _version(name: str) -> str | None:
@@ -37,16 +73,11 @@ def _version(name: str) -> str | None:
         return None
 
 
-def _commit() -> str | None:
-    """Commit of the checkout that surgsim runs from; None when it was installed."""
-    return commit_of(Path(surgsim.__file__).resolve().parents[1])
-
-
 def commit_of(root: Path) -> str | None:
     """Commit of the checkout at `root`, None if it is none.
 
     Local changes of what can change a result are added as `+dirty.` and the start of their hash: those of
-    tracked files, and new files that git does not ignore.
+    tracked modules and assets, and new ones that git does not ignore.
     """
     if not (root / ".git").exists():
         return None

@@ -1,5 +1,8 @@
 """Finding and loading scenario and controller files."""
 
+import json
+import operator
+import os
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -8,10 +11,15 @@ from typing import Any
 from surgsim.control.controller import ControllerConfig
 from surgsim.errors import ScenarioError, unknown_name
 from surgsim.resources import resource_dir
+from surgsim.scenario.plain import document_of
 from surgsim.scenario.schema import Scenario
 from surgsim.scenario.validate import validate
-from surgsim.scenario.wording import one_line
+from surgsim.scenario.wording import one_line, show_with_kind
 from surgsim.scenario.yaml_text import YamlDocument, read_yaml, set_value
+
+Source = str | os.PathLike[str] | Mapping[str, Any]
+"""A shipped name, a path, or the content itself."""
+_GIVEN_CONTROLLER = "given controller"
 
 
 def shipped(folder: str = "") -> dict[str, Path]:
@@ -19,65 +27,98 @@ def shipped(folder: str = "") -> dict[str, Path]:
     return {path.stem: path for path in sorted((resource_dir("scenarios") / folder).glob("*.yaml"))}
 
 
-def find(name: str, folder: str, kind: str) -> Path:
-    """The file that `name` means: a path, or the name of a shipped file.
+def shipped_safety() -> dict[str, Path]:
+    """Names, such as `safety/tip_limit`, and files of the scenarios that end early, one for each outcome."""
+    return {f"safety/{name}": path for name, path in shipped("safety").items()}
+
+
+def find(name: str | os.PathLike[str], folder: str, kind: str) -> Path:
+    """The file that `name` means: a path, or the name of a shipped file if it is a string.
 
     Raises:
         ScenarioError: If it is neither.
     """
-    if name in shipped(folder):
-        return shipped(folder)[name]
+    if not isinstance(name, str):
+        return Path(name)
     path = Path(name)
-    group, _, inner = name.partition("/")
-    if not folder and group == "safety" and inner in shipped(group):
-        return shipped(group)[inner]
-    if path.suffix in (".yaml", ".yml") or len(path.parts) > 1:
+    safety = not folder and name.startswith("safety/") and not path.exists()
+    known = shipped_safety() if safety else shipped(folder)
+    if name in known:
+        return known[name]
+    if path.suffix in (".yaml", ".yml") or (len(path.parts) > 1 and not safety):
         return path
-    raise ScenarioError("", f"{unknown_name(name, f'shipped {kind}', shipped(folder))} Or give a .yaml file.")
+    raise ScenarioError("", f"{unknown_name(name, f'shipped {kind}', known)} Or give a .yaml file.")
 
 
 def load_scenario(
-    name: str,
+    source: Source | Scenario,
     *,
-    controller: str | None = None,
+    controller: Source | ControllerConfig | None = None,
     assignments: Sequence[str] = (),
     seed: int | None = None,
 ) -> Scenario:
-    """Load a scenario by path or shipped name.
+    """Load a scenario by path or shipped name, or check one that is given.
 
     Args:
-        name: Path of a YAML file, or the name of a shipped scenario.
-        controller: Controller to use instead of the scenario's own: a path or a shipped name.
+        source: Path of a YAML file, name of a shipped scenario, the content as a mapping, or a scenario.
+        controller: Controller to use instead of the scenario's own: a path, a shipped name, or the content.
         assignments: `key.path=value` overrides, applied after the controller is put in place.
         seed: Seed to use instead of the scenario's own.
 
     Raises:
         ScenarioError: If anything is wrong, naming file, line and key.
     """
-    document = read_yaml(find(name, "", "scenario"))
+    document = _document(source)
     if controller is not None:
-        document = replace(document, tree={**document.tree, "controller": controller})
+        document = _instead(document, controller)
     document = _with_controller(document, from_option=controller is not None)
     for assignment in assignments:
         document = _with_controller(set_value(document, assignment), from_option=True)
     if seed is not None:
-        if seed < 0:
-            raise ScenarioError("--seed", f"{seed} is not allowed: must be 0 or more")
-        if seed >= 2**63:
-            raise ScenarioError(
-                "--seed", f"{one_line(str(seed))} is out of range: an integer has at most 63 bits"
-            )
-        document = set_value(document, f"seed={seed}")
+        document = set_value(document, f"seed={_checked_seed(seed)}")
     return validate(Scenario, document)
 
 
-def load_controller(name: str) -> ControllerConfig:
-    """Load a controller by path or shipped name.
+def _document(source: Source | Scenario) -> YamlDocument:
+    if isinstance(source, str | os.PathLike):
+        return read_yaml(find(source, "", "scenario"))
+    if isinstance(source, Mapping | Scenario):
+        return document_of(source)
+    raise ScenarioError("", f"a {type(source).__name__} is no scenario: give a name, a path or a mapping")
+
+
+def _instead(document: YamlDocument, controller: Source | ControllerConfig) -> YamlDocument:
+    """`document` with another controller; one that is given is checked first, so that its errors name it."""
+    if isinstance(controller, str):
+        return replace(document, tree={**document.tree, "controller": controller})
+    if not isinstance(controller, os.PathLike | Mapping | ControllerConfig):
+        reason = f"a {type(controller).__name__} is no controller: give a name, a path or a mapping"
+        raise ScenarioError("--controller", reason)
+    config = load_controller(controller)
+    return replace(document, tree={**document.tree, "controller": json.loads(config.model_dump_json())})
+
+
+def _checked_seed(seed: int) -> int:
+    if isinstance(seed, bool) or not hasattr(seed, "__index__"):
+        raise ScenarioError("--seed", f"{show_with_kind(seed)} is not an integer")
+    if seed < 0:
+        raise ScenarioError("--seed", f"{seed} is not allowed: must be 0 or more")
+    if seed >= 2**63:
+        raise ScenarioError(
+            "--seed", f"{one_line(str(seed))} is out of range: an integer has at most 63 bits"
+        )
+    return operator.index(seed)
+
+
+def load_controller(source: Source | ControllerConfig) -> ControllerConfig:
+    """Load a controller by path or shipped name, or check one that is given.
 
     Raises:
         ScenarioError: If anything is wrong, naming file, line and key.
     """
-    return validate(ControllerConfig, read_yaml(find(name, "controllers", "controller")))
+    if isinstance(source, Mapping | ControllerConfig):
+        return validate(ControllerConfig, document_of(source, _GIVEN_CONTROLLER))
+    return validate(ControllerConfig, read_yaml(find(source, "controllers", "controller")))
 
 
 def _with_controller(document: YamlDocument, *, from_option: bool) -> YamlDocument:

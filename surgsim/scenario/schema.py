@@ -15,6 +15,7 @@ from surgsim.plant.disturbances import DISTURBANCES
 from surgsim.plant.dynamic import DynamicPlantConfig
 from surgsim.plant.part import PlantPart
 from surgsim.plant.props import PROPS
+from surgsim.scenario.thresholds import ThresholdsConfig
 from surgsim.tasks import TASKS
 
 AnyTask: Any = TASKS.union()
@@ -109,7 +110,16 @@ class RecordingConfig(PartConfig):
 
 
 class Scenario(PartConfig):
-    """One experiment: scene, task, controller, plant, disturbances, limits, seed."""
+    """One experiment: scene, task, controller, plant, disturbances, limits, seed.
+
+    It cannot be changed; `surgsim.load(scenario, ...)` gives a changed one.
+
+    Example:
+        >>> import surgsim
+        >>> scenario = surgsim.load("circle_lwr4plus")
+        >>> scenario.robot.name, scenario.task.radius_m, scenario.simulation.control_period_s
+        ('lwr4plus', 0.02, 0.001)
+    """
 
     schema_version: Literal[1] = 1
     name: Name
@@ -127,6 +137,7 @@ class Scenario(PartConfig):
     props: tuple[AnyProp, ...] = ()
     simulation: SimulationConfig = SimulationConfig()
     safety: SafetyConfig = SafetyConfig()
+    thresholds: ThresholdsConfig = ThresholdsConfig()
     recording: RecordingConfig = RecordingConfig()
 
     @model_validator(mode="after")

@@ -15,6 +15,7 @@ from pydantic import ValidationError
 
 from surgsim.catalog import PartConfig
 from surgsim.errors import ScenarioError, unknown_name
+from surgsim.scenario.magnitudes import check_magnitudes
 from surgsim.scenario.wording import Shape, one_line, show, show_with_kind, unwrap
 from surgsim.scenario.yaml_events import KeyPath
 from surgsim.scenario.yaml_text import YamlDocument
@@ -22,7 +23,6 @@ from surgsim.scenario.yaml_text import YamlDocument
 M = TypeVar("M", bound=PartConfig)
 
 _ABSENT = object()
-_LEAST, _MOST = 1e-30, 1e15
 _MOST_WORDED = 100
 _LONGEST = 400
 _TYPE_CODES = ("int_from_float", "too_short", "too_long", "literal_error", "missing", "extra_forbidden")
@@ -60,7 +60,7 @@ def validate(model: type[M], document: YamlDocument) -> M:
     Raises:
         ScenarioError: For the top-most problem, with the number of further ones.
     """
-    _check_magnitudes(document)
+    check_magnitudes(document)
     try:
         return model.model_validate_json(json.dumps(document.tree), strict=True)
     except ValidationError as error:
@@ -69,29 +69,6 @@ def validate(model: type[M], document: YamlDocument) -> M:
         rest = len(problems) - 1
         more = f" (and {rest} more problem{'s' if rest > 1 else ''})" if rest else ""
         raise ScenarioError(document.where(first.path), _word(first) + more) from error
-
-
-def _check_magnitudes(document: YamlDocument) -> None:
-    """Refuse numbers whose square, or the product of a few, would leave double precision.
-
-    Raises:
-        ScenarioError: For the first one.
-    """
-    for path, value in _numbers(document.tree):
-        if value and not _LEAST <= abs(value) <= _MOST:
-            reason = (
-                f"{value:g} is not allowed: the size of a number must be 0, or from {_LEAST:g} to {_MOST:g}"
-            )
-            raise ScenarioError(document.where(path), reason)
-
-
-def _numbers(tree: Any, path: KeyPath = ()) -> Iterator[tuple[KeyPath, float]]:
-    """Every number with a fraction or exponent, and its place."""
-    for key, value in tree.items() if isinstance(tree, dict) else enumerate(tree):
-        if isinstance(value, float):
-            yield (*path, key), value
-        elif isinstance(value, dict | list):
-            yield from _numbers(value, (*path, key))
 
 
 def _problems(model: type[M], document: YamlDocument, error: ValidationError) -> Iterator[Problem]:

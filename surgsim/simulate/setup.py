@@ -57,6 +57,7 @@ def prepare(scenario: Scenario) -> Setup:
     period = scenario.simulation.control_period_s
     task = _build_task(scenario, _path_start(scenario, arm))
     _check_length(scenario, task)
+    _check_beginnings(scenario, task)
     try:
         scene = build(scenario.scene, parts, drawn=False)
     except ValueError as error:
@@ -116,6 +117,21 @@ def _check_length(scenario: Scenario, task: Task) -> None:
             raise SurgsimError(
                 f"{scenario.name}: the task lasts {task.duration_s:g} s, {count:.3g} {what} "
                 f"of {step_s:g} s; at most {most:.0e} are allowed"
+            )
+
+
+def _check_beginnings(scenario: Scenario, task: Task) -> None:
+    """Refuse a disturbance that would never act: the run would pass for a disturbed one.
+
+    Raises:
+        SurgsimError: For the first one that begins at or after the end of the run.
+    """
+    for i, disturbance in enumerate(scenario.disturbances):
+        begins_s = disturbance.begins_s
+        if begins_s >= task.duration_s:
+            raise SurgsimError(
+                f"{scenario.name}: disturbances.{i} starts at {begins_s:g} s, "
+                f"the run ends at {task.duration_s:g} s"
             )
 
 

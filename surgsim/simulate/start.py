@@ -62,7 +62,10 @@ class Reach:
             try:
                 step = self._step(configuration, hard=True)
             except mink.NoSolutionFound:
-                step = self._step(configuration, hard=False)
+                try:
+                    step = self._step(configuration, hard=False)
+                except mink.NoSolutionFound:  # too far away for the solver: what is there will miss
+                    break
             length = float(np.linalg.norm(step))
             configuration.integrate_inplace(step * min(1.0, 0.3 / max(length, 1e-12)), 1.0)
             if count >= 1 and max(self.miss(configuration.q, p_WT)) < 1e-9:

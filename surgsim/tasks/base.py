@@ -15,6 +15,7 @@ from surgsim.compiled import compiled
 from surgsim.models.config import Vec3
 from surgsim.spatial import plane_axes
 from surgsim.tasks.profile import Profile
+from surgsim.tasks.success import RunColumns, Success, path_success
 from surgsim.tick.arrays import Command
 from surgsim.tick.blank import new_command, new_feedback
 
@@ -209,6 +210,10 @@ class PathTaskConfig(PartConfig, ABC):
         )
         axes = plane_axes(np.array(self.normal), np.array(self.direction))
         return PathTask(shape=self, profile=profile, start=np.array(start), R_WP=np.column_stack(axes))
+
+    def success(self, run: RunColumns) -> Success:
+        """Whether the path was followed."""
+        return path_success(run)
 
 
 PathKernel = Callable[[Array, float, Array], None]

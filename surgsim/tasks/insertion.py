@@ -11,12 +11,15 @@ from surgsim.models.config import TrocarConfig, Vec3
 from surgsim.spatial import unit
 from surgsim.tasks.base import Array, Feedback, TipCommand
 from surgsim.tasks.profile import Profile
+from surgsim.tasks.success import PATH_NEEDS, RunColumns, Success
 
 _REACH_SAMPLES = 60
 _ALIGNED_M = 0.02  # nearer to the port, tip and trocar alone do not say how the shaft is turned
 _ARRIVED_M = 1e-3
 _BESIDE_M = 1e-3
 _AT_REST = np.zeros(3)
+TO_TARGET = 2.0
+"""Value of the column `insertion_phase` once the tip is at depth and on the way to the target."""
 
 
 class InsertionConfig(PartConfig):
@@ -75,6 +78,14 @@ class InsertionConfig(PartConfig):
         if trocar is None:
             trocar = TrocarConfig(position_m=(float(start[0]), float(start[1]), float(start[2]) - 0.05))
         return Insertion(self, np.array(start), trocar)
+
+    def success(self, run: RunColumns) -> Success:
+        """Whether the tip came to its depth, and from there to the target."""
+        if run["insertion_phase"][-1] < TO_TARGET:
+            depth = 1e3 * float(run["insertion_depth_m"][-1])
+            reason = f"the tip came to {depth:.1f} mm of {1e3 * self.depth_m:.1f} mm depth"
+            return Success(done=False, reason=reason)
+        return Success(done=True, reason="the instrument is inserted", needs=PATH_NEEDS)
 
 
 class Insertion:
@@ -142,7 +153,7 @@ class Insertion:
         else:
             command = self._led(feedback)
         depth = self._depth(command.p_WTd)
-        self._values = np.array([depth, 2.0 if after >= 0.0 else float(depth >= 0.0)])
+        self._values = np.array([depth, TO_TARGET if after >= 0.0 else float(depth >= 0.0)])
         return command
 
     def values(self) -> Array:

@@ -12,7 +12,14 @@ from surgsim.columns import scalar, vector
 from surgsim.models.config import Vec3
 from surgsim.models.peg_board import PegBoardLayout
 from surgsim.tasks.base import EnergyBudget, Feedback, TipCommand
-from surgsim.tasks.teleoperation_program import GoalConfig, board_goals, way_points
+from surgsim.tasks.success import RunColumns, Success
+from surgsim.tasks.teleoperation_program import (
+    GoalConfig,
+    board_goals,
+    goals_success,
+    rings_success,
+    way_points,
+)
 from surgsim.teleop.account import ACCOUNT_COLUMNS, account
 from surgsim.teleop.channel import Channel, ChannelConfig
 from surgsim.teleop.console import ConsoleConfig
@@ -117,6 +124,12 @@ class TeleoperationConfig(PartConfig):
     ) -> "Teleoperation":
         """The task from `start` (3,) [m]; everything random in it comes from `seed`."""
         return Teleoperation(self, np.array(start), period_s, seed or np.random.SeedSequence(0))
+
+    def success(self, run: RunColumns) -> Success:
+        """Whether every ring is on its peg, or every goal was reached."""
+        if self.program == "peg_and_ring":
+            return rings_success(run)
+        return goals_success(run, len(self.goals))
 
     def operator_side(self) -> OperatorSideConfig:
         """What the operator's side consists of."""

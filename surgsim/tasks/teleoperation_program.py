@@ -9,11 +9,14 @@ from pydantic import Field, NonNegativeFloat, PositiveFloat
 from surgsim.catalog import PartConfig
 from surgsim.models.config import Vec3
 from surgsim.models.peg_board import PegBoardLayout, transfer_goals
+from surgsim.tasks.success import RunColumns, Success
 from surgsim.teleop.operator import Goal
 
 Array = NDArray[np.float64]
 _STEP_M = 0.005
 _ABOVE_M = 0.001
+RING_ON_TARGET = 2.0
+"""Value of a column `ring_state_{1..n}` while the ring rests on its target peg."""
 
 
 class GoalConfig(PartConfig):
@@ -82,3 +85,23 @@ def way_points(start: Array, goals: tuple[Goal, ...]) -> list[tuple[str, Array]]
         ]
         here = here + way
     return points
+
+
+def rings_success(run: RunColumns) -> Success:
+    """Success of the transfers of a peg board: every ring rests on its target peg at the end."""
+    on_target = run.block("ring_state")[-1] == RING_ON_TARGET
+    moved, count = int(np.count_nonzero(on_target)), len(on_target)
+    return Success(done=moved == count, reason=f"{moved} of {count} rings are on their pegs")
+
+
+def goals_success(run: RunColumns, count: int) -> Success:
+    """Success of a program of `count` goals: the operator has reached each of them, and given up none."""
+    if count == 0:
+        return Success(done=None, reason="the operator has no goals")
+    at, missed = int(run["goal"][-1]), int(run["goals_missed"][-1])
+    if run["operator_done"][-1] > 0.0 and at < count:
+        return Success(done=None, reason="a person operated, whose goals nobody counts")
+    if at < count:
+        left = f"the operator was still at goal {at + 1} of {count} when time was up"
+        return Success(done=False, reason=left + (f", {missed} missed" if missed else ""))
+    return Success(done=missed == 0, reason=f"{count - missed} of {count} goals were reached")

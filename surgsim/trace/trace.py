@@ -3,13 +3,16 @@
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from surgsim.columns import Block, joints, scalar, vector
-from surgsim.errors import Outcome
+from surgsim.errors import Outcome, SurgsimError, UnknownNameError, not_held
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 Array = NDArray[np.float64]
 
@@ -134,12 +137,18 @@ class TraceMeta:
 
 
 class Trace:
-    """Columns of a run, read-only.
+    """Columns of a run, read-only: one row per control tick, SI units that the columns' names end with.
 
     Args:
         data: Rows x columns; copied unless already read-only.
         blocks: The columns, in order.
         meta: What belongs to them.
+
+    Example:
+        >>> import surgsim
+        >>> trace = surgsim.run("circle_lwr4plus", task={"duration_s": 2.0}).trace
+        >>> trace["tip_error_m"].shape, trace.block("tip").shape
+        ((3001,), (3001, 3))
     """
 
     def __init__(self, data: Array, blocks: Sequence[Block], meta: TraceMeta) -> None:
@@ -171,17 +180,75 @@ class Trace:
         return self._data
 
     def __getitem__(self, column: str) -> Array:
-        """One column (rows,)."""
-        return self._data[:, self._index[column]]
+        """One column (rows,).
+
+        Raises:
+            UnknownNameError: If there is none of that name.
+        """
+        try:
+            return self._data[:, self._index[column]]
+        except (KeyError, TypeError):  # TypeError: not hashable
+            raise self._no_column(column) from None
 
     def __contains__(self, block: str) -> bool:
         """Whether there is a block of that name."""
         return block in self._blocks
 
+    def _no_column(self, name: object) -> UnknownNameError:
+        if isinstance(name, str) and name in self._blocks:
+            width = len(self.columns_of(name))
+            return UnknownNameError(f"'{name}' is a block of {width} columns: ask for block('{name}')")
+        return not_held(name, "column of this trace", self._index, "its columns")
+
+    def columns_of(self, block: str) -> tuple[str, ...]:
+        """Names of a block's columns.
+
+        Raises:
+            UnknownNameError: If there is no such block.
+        """
+        if block not in self._blocks:
+            raise not_held(block, "block of this trace", self._blocks, "its blocks")
+        return self._blocks[block].columns
+
     def block(self, name: str) -> Array:
-        """A block's columns (rows, width)."""
-        first = self._index[self._blocks[name].columns[0]]
-        return self._data[:, first : first + len(self._blocks[name].columns)]
+        """A block's columns (rows, width).
+
+        Raises:
+            UnknownNameError: If there is none of that name.
+        """
+        columns = self.columns_of(name)
+        first = self._index[columns[0]]
+        return self._data[:, first : first + len(columns)]
+
+    def to_numpy(self) -> Array:
+        """A copy of all columns (rows, columns) that may be changed."""
+        return self._data.copy()
+
+    def to_dict(self) -> dict[str, Array]:
+        """The columns by name, each (rows,), read-only."""
+        return {name: self[name] for name in self.columns}
+
+    def to_pandas(self) -> "pd.DataFrame":
+        """A data frame of all columns, one row per control tick.
+
+        Raises:
+            SurgsimError: If pandas is not installed.
+        """
+        try:
+            import pandas as pd
+        except ModuleNotFoundError as error:
+            raise SurgsimError("to_pandas needs pandas: pip install 'surgsim[pandas]'") from error
+        return pd.DataFrame(self.to_numpy(), columns=list(self.columns))
+
+    def __repr__(self) -> str:
+        from surgsim.trace.show import as_text
+
+        return as_text(self)
+
+    def _repr_html_(self) -> str:
+        from surgsim.trace.show import as_html
+
+        return as_html(self)
 
     def active(self) -> "Trace":
         """The run itself: this trace without the rows of the stop that followed its outcome."""

@@ -72,6 +72,10 @@ def _one_line(done):
 
 WRONG = {
     "unknown scenario": (["run", "circel_lwr4plus"], "'circel_lwr4plus' is not a shipped scenario. Known: "),
+    "unknown safety scenario": (
+        ["run", "safety/tip_limt"],
+        "'safety/tip_limt' is not a shipped scenario. Known: safety/diverged, ",
+    ),
     "unknown controller": (
         ["run", "circle_lwr4plus", "--controller", "vprn"],
         "--controller: 'vprn' is not a ",
@@ -129,6 +133,48 @@ def test_a_wrong_command_exits_2_with_the_usage(capsys, words):
     assert error.startswith("usage: surgsim")
 
 
+MISTYPED = {
+    "command": (["rnu"], "'rnu' is not a command. Known: bench, check, "),
+    "kind": (["list", "controler"], "'controler' is not a kind. Known: controllers, "),
+    "option": (
+        ["run", "circle_lwr4plus", "--contrller", "qp"],
+        "'--contrller' is not an option of surgsim run.",
+    ),
+    "value": (
+        ["compare", "quick", "--engine", "locla"],
+        "'locla' is not a value of --engine. Known: local, ray.",
+    ),
+}
+MEANT = {"command": "run", "kind": "controllers", "option": "--controller", "value": "local"}
+
+
+@pytest.mark.parametrize("what", MISTYPED)
+def test_a_mistyped_word_is_met_with_help_and_what_was_meant(capsys, what):
+    words, text = MISTYPED[what]
+    with pytest.raises(SystemExit) as ended:
+        main(words)
+    assert ended.value.code == 2
+    out, error = capsys.readouterr()
+    assert out == ""
+    last = error.splitlines()[-1]
+    assert last.startswith(f"surgsim: {text}")
+    assert last.endswith(f" Did you mean '{MEANT[what]}'?")
+    assert ("examples:" in error) == (what in ("command", "kind")), "the whole help, or the usage"
+
+
+@pytest.mark.parametrize(
+    ("words", "missing"),
+    [([], "COMMAND"), (["list"], "KIND"), (["run"], "SCENARIO"), (["compare"], "SUITE|")],
+)
+def test_a_bare_command_shows_its_help(capsys, words, missing):
+    with pytest.raises(SystemExit):
+        main(words)
+    error = capsys.readouterr().err
+    assert error.splitlines()[-1].startswith(f"surgsim: {missing}")
+    assert error.splitlines()[-1].endswith(" is missing")
+    assert "examples:" in error
+
+
 @pytest.mark.parametrize("command", ["", *COMMANDS])
 def test_help_goes_to_stdout_with_examples(capsys, command):
     with pytest.raises(SystemExit) as ended:
@@ -156,9 +202,8 @@ def test_list_prints_names_with_descriptions(capsys, kind):
     assert all(set(item) == {"name", "description"} for item in items)
     names = [item["name"] for item in items]
     assert len(set(names)) == len(names)
-    if kind not in ("suites", "robots"):
-        assert names
-        assert all(item["description"] for item in items)
+    assert names
+    assert kind == "suites" or all(item["description"] for item in items)
     assert main(["list", kind]) == 0
     table = capsys.readouterr().out
     assert table.split("\n")[0].rstrip() == f"{len(items)} {kind}"
@@ -168,7 +213,9 @@ def test_list_prints_names_with_descriptions(capsys, kind):
 @pytest.mark.parametrize(
     ("kind", "some"),
     [
-        ("scenarios", {"circle_lwr4plus", "sinusoid_lwr4plus", "spiral_lwr4plus"}),
+        ("scenarios", {"circle_lwr4plus", "sinusoid_lwr4plus", "spiral_lwr4plus", "safety/tip_limit"}),
+        ("policies", {"damping", "proportional"}),
+        ("plants", {"dynamic", "kinematic"}),
         ("controllers", {"vprnn"}),
         ("robots", {"lwr4plus"}),
         ("tasks", {"circle", "sinusoid", "spiral"}),
@@ -194,7 +241,7 @@ def test_check_prints_the_resolved_scenario_which_is_the_same_scenario(capsys, t
     resolved.write_text(out)
     scenario = load_scenario(str(resolved))
     assert (scenario.seed, scenario.task.radius_m) == (4, 0.03)
-    assert re.match(rf"# circle_lwr4plus: ok, 11 s; sha256 {scenario.sha256()}\n", out)
+    assert re.match(rf"# circle_lwr4plus: ok, 11 s\n# sha256 {scenario.sha256()}\n", out)
 
 
 def test_check_looks_at_every_scenario_and_exits_2_if_any_is_wrong(capsys):

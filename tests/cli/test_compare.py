@@ -3,16 +3,16 @@
 import json
 import os
 import re
-import signal
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import pytest
 
 from surgsim.cli.main import main
+from surgsim.compare.job import CRASHED, WORKER_DIED, do, write_failure
 from surgsim.compare.table import read_table
+from surgsim.compare.workers import Done
 
 SUITE = """\
 name: tiny
@@ -60,7 +60,7 @@ def test_it_ends_with_a_leaderboard(done, folder):
     assert done.returncode == 0, done.stderr
     assert "pinv" in done.stdout
     assert "vprnn" in done.stdout
-    assert "rcm_error_rms_mm" in done.stdout
+    assert "RCM error, RMS" in done.stdout
     out = folder / "runs" / "suites" / "tiny"
     assert sorted(path.name for path in out.iterdir()) == [
         "report.html",
@@ -111,39 +111,23 @@ def test_shards_from_the_command_line(capsys, monkeypatch, folder, done):
     assert read_table(folder / "shards").select(columns).equals(whole)
 
 
-def test_ctrl_c_ends_the_workers_and_says_how_to_go_on(folder):
-    command = [sys.executable, "-m", "surgsim", "compare", "tiny.yaml", "--out", "broken", "--seeds", "0:50"]
-    with subprocess.Popen(
-        command, cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-    ) as process:
-        end = time.monotonic() + 100.0
-        while not list((folder / "broken").glob("runs/*/*/*/metrics.json")):
-            assert time.monotonic() < end, "no run was done"
-            time.sleep(0.02)
-        children = Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()
-        process.send_signal(signal.SIGINT)
-        out, error = process.communicate(timeout=60)
-    assert process.returncode == 130
-    assert out == ""
-    assert error.splitlines()[-1] == "surgsim: interrupted; --resume --out broken runs what is missing"
-    assert "Traceback" not in error
-    assert children
-    end = time.monotonic() + 30.0
-    while any(alive(pid) for pid in children):
-        assert time.monotonic() < end, "workers are left"
-        time.sleep(0.02)
-
-
-def alive(pid):
-    try:
-        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
-    except OSError:
-        return False
-
-
 WRONG = {
     "suite and scenario": (["quick", "circle_lwr4plus"], "give one suite, or scenarios; not both"),
-    "neither": (["nonsense"], "'nonsense' is not a shipped scenario. Known: "),
+    "neither": (["nonsense"], "'nonsense' is not a shipped suite or scenario. Known: "),
+    "mistyped": (["qiuck"], "'qiuck' is not a shipped suite or scenario. Known: "),
+    "set nothing": (
+        ["quick", "--set", "task.radios_m=1"],
+        "--set task.radios_m=1: task.radios_m: unknown key",
+    ),
+    "set a seed": (["quick", "--set", "seed=3"], "--set seed=3: the seeds of a suite are given by --seeds"),
+    "set a controller": (
+        ["quick", "--set", "controller=qp"],
+        "--set controller=qp: the controllers of a suite are given by --controllers",
+    ),
+    "set what is varied": (
+        ["frontier", "--set", "disturbances=[]"],
+        "--set disturbances=[]: suite 'frontier' varies this itself: ",
+    ),
     "no file": (["nothing.yaml"], "nothing.yaml: cannot be read: "),
     "controller": (["quick", "--controllers", "vprn"], "--controller: 'vprn' is not a shipped controller."),
     "seeds": (["quick", "--seeds", "x"], "--seeds: 'x' is not a list of seeds: write 0:10, 3 or 1,4,9"),
@@ -171,3 +155,29 @@ def test_what_is_wrong_is_said_before_anything_is_run(capsys, monkeypatch, tmp_p
     assert error.startswith(f"surgsim: {text}")
     assert error.count("\n") == 1
     assert [path.name for path in tmp_path.iterdir()] == ["other.txt"]
+
+
+def test_a_batch_with_crashed_runs_is_no_success(capsys, monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "tiny.yaml").write_text(SUITE)
+
+    def runner(options):
+        def run(jobs, count):
+            ends = [CRASHED, "completed", WORKER_DIED, "completed"]
+            for index, (job, end) in enumerate(zip(jobs, ends, strict=True)):
+                if end == "completed":
+                    yield Done(index=index, outcome=do(job))
+                else:
+                    write_failure(job.scenario(), Path(job.folder), end, "by the test")
+                    yield Done(index=index, outcome=end)
+
+        return run
+
+    monkeypatch.setattr("surgsim.cli.compare._runner", runner)
+    assert main(["compare", "tiny.yaml"]) == 1
+    error = capsys.readouterr().err.splitlines()
+    assert error[-1] == (
+        "surgsim: 2 of 4 runs crashed or lost their worker: circle_lwr4plus/pinv/base-seed0, "
+        "circle_lwr4plus/vprnn/base-seed0; outcome_detail in runs.csv says how"
+    )
+    assert (tmp_path / "runs" / "suites" / "tiny" / "report.html").is_file()

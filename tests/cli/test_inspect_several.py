@@ -9,7 +9,7 @@ import pyarrow as pa
 import pytest
 from rerun.chunk import RrdReader
 
-from surgsim.cli.inspect import _largest_gap_mm
+from surgsim.cli.inspect_pair import differing, largest_gap_mm
 from surgsim.cli.main import main
 from surgsim.cli.output import format_number
 from surgsim.compare.engine import Batch, compare
@@ -65,10 +65,22 @@ def test_two_recordings_are_compared(runs, capsys, monkeypatch, tmp_path):
     assert main(["inspect", *runs]) == 0
     out, error = capsys.readouterr()
     assert error == ""
-    assert out.splitlines()[0].rstrip() == "circle_lwr4plus"
-    assert out.splitlines()[1].split() == ["metric", "pinv", "joint_impedance", "difference"]
-    assert {line.split()[0] for line in out.splitlines()[2 : 2 + len(METRICS)]} == set(METRICS)
-    largest = float(out.splitlines()[-1].removeprefix("largest distance between the two tips: ").split()[0])
+    lines = out.splitlines()
+    assert lines[:7] == [
+        f"a: {runs[0]}",
+        f"b: {runs[1]}",
+        "",
+        "What differs",
+        "setting          a     b",
+        "controller.name  pinv  joint_impedance",
+        "",
+    ]
+    assert (lines[7], lines[8].split()) == ("Metrics", ["metric", "a", "b", "b", "-", "a"])
+    stored = [json.loads((Path(run) / "metrics.json").read_text())["metrics"] for run in runs]
+    shown = [name for name in METRICS if any(metrics[name] is not None for metrics in stored)]
+    assert [line.split()[0] for line in lines[9:-2]] == shown
+    assert len(shown) < len(METRICS), "what neither has is left out"
+    largest = float(lines[-1].removeprefix("largest distance between the two tips: ").split()[0])
     assert 1.0 < largest < 10.0
     assert list(tmp_path.iterdir()) == [], "nothing is written unless asked for"
 
@@ -237,14 +249,14 @@ def test_a_batch_without_recordings_says_how_to_record_them(copy, listed, capsys
 @pytest.mark.parametrize(("gap_m", "text"), [(0.0, "0"), (3e-17, "3.000e-14"), (0.002, "2.000")])
 def test_the_distance_of_the_tips_is_told_however_small(runs, gap_m, text):
     still, moved = (tip_traces(read_recording(Path(runs[0])).trace, x) for x in (0.0, gap_m))
-    assert format_number(_largest_gap_mm(still, moved)) == text
+    assert format_number(largest_gap_mm(still, moved)) == text
 
 
 def test_ticks_at_which_a_tip_is_not_finite_do_not_count(runs):
     trace = read_recording(Path(runs[0])).trace
     still, moved = tip_traces(trace, 0.0), tip_traces(trace, 0.002, broken=1)
-    assert _largest_gap_mm(still, moved) == pytest.approx(2.0)
-    assert _largest_gap_mm(still, tip_traces(trace, 0.0, broken=len(trace))) is None
+    assert largest_gap_mm(still, moved) == pytest.approx(2.0)
+    assert largest_gap_mm(still, tip_traces(trace, 0.0, broken=len(trace))) is None
 
 
 def tip_traces(trace, x_m, broken=0):
@@ -254,3 +266,44 @@ def tip_traces(trace, x_m, broken=0):
     data[:, first : first + 3] = (x_m, 0.0, 0.0)
     data[len(data) - broken :, first] = math.nan
     return Trace(data, trace.blocks, trace.meta)
+
+
+def test_what_differs_of_two_scenarios():
+    a = {"seed": 0, "task": {"type": "circle", "radius_m": 0.02}, "disturbances": [{"type": "push", "x": 1}]}
+    b = {"seed": 1, "task": {"type": "circle", "radius_m": 0.01}, "disturbances": [{"type": "push", "x": 2}]}
+    assert list(differing(a, a)) == []
+    assert list(differing(a, b)) == [
+        ("seed", 0, 1),
+        ("task.radius_m", 0.02, 0.01),
+        ("disturbances.0.x", 1, 2),
+    ]
+    other = {"task": {"type": "spiral", "turns": 2}, "disturbances": []}
+    assert list(differing(a, other)) == [
+        ("seed", 0, None),
+        ("task.type", "circle", "spiral"),
+        ("disturbances", [{"type": "push", "x": 1}], []),
+    ]
+
+
+def test_the_same_run_twice_is_said_to_be_the_same(runs, capsys):
+    assert main(["inspect", runs[0], runs[0]]) == 0
+    assert "\nThe scenarios are the same.\n" in capsys.readouterr().out
+
+
+def test_a_run_without_recording_says_what_it_is(copy, capsys):
+    run = copy / "runs" / A
+    (run / "recording.rrd").unlink()
+    assert said(["inspect", str(run)], capsys) == (
+        f"surgsim: {run}: a run without recording, circle_lwr4plus with pinv, completed; "
+        f"its metrics are in metrics.json. To record it: surgsim run {run}/scenario.yaml --out DIR\n"
+    )
+
+
+def test_a_folder_of_runs_or_of_batches_says_what_it_is(copy, batch, capsys):
+    folder = copy / "runs" / "circle_lwr4plus"
+    (folder / ".draft.part").mkdir()
+    (folder / ".draft.part" / "metrics.json").write_text("{}")
+    assert said(["inspect", str(folder)], capsys) == (
+        f"surgsim: {folder}: a folder of 2 runs: {folder}/joint_impedance/base-seed0, "
+        f"{folder}/pinv/base-seed0. To look into one: surgsim inspect {folder}/joint_impedance/base-seed0\n"
+    )

@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -97,6 +98,7 @@ def make_results(root: Path, names: dict[str, Any] = PLAIN, seeds: int = 10) -> 
                             seed=seed,
                             parameters=json.dumps({KEY: mass}),
                             outcome=outcome,
+                            success=outcome == "completed",
                             outcome_detail="" if outcome == "completed" else "<i>5.1</i> mm & more",
                             folder=folder,
                             recording=f"{folder}/recording.rrd" if seed == 0 else None,
@@ -143,9 +145,16 @@ def made_results(tmp_path_factory) -> Callable[..., Path]:
 
 @pytest.fixture
 def runs_of() -> Callable[..., Observations]:
-    """Factory of observations from `{controller: {(scenario, seed): value or outcome}}`; tip_error_rms_mm."""
+    """Factory of observations from `{controller: {(scenario, seed): value or outcome}}`; tip_error_rms_mm.
 
-    def make(given: dict[str, dict[tuple[str, int], float | str | None]], metric: str = "tip_error_rms_mm"):
+    Any difference matters, if not said.
+    """
+
+    def make(
+        given: dict[str, dict[tuple[str, int], float | str | None]],
+        metric: str = "tip_error_rms_mm",
+        matters: float = 0.0,
+    ):
         rows = []
         for controller, runs in given.items():
             for (scenario, seed), value in runs.items():
@@ -155,6 +164,16 @@ def runs_of() -> Callable[..., Observations]:
                 rows.append(
                     row_of(scenario=scenario, controller=controller, seed=seed, outcome=outcome, **found)
                 )
-        return observations(rows)
+        return replace(observations(rows), smallest={metric: matters})
+
+    return make
+
+
+@pytest.fixture
+def rows_of_table() -> Callable[..., Observations]:
+    """Factory of observations from rows of the table, completed, with the given values."""
+
+    def make(given: list[dict[str, Any]]) -> Observations:
+        return observations([row_of(**row, folder=f"runs/{i}") for i, row in enumerate(given)])
 
     return make

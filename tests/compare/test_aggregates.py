@@ -104,6 +104,13 @@ def test_leaderboard_counts_failures_beside_every_figure(runs_of):
     assert rows["first"].rank.value == pytest.approx((5 * 1 + 3 * 2) / 8)
 
 
+def test_leaderboard_counts_the_runs_that_did_not_do_their_task(rows_of_table):
+    given = [True, True, False, None]
+    table = rows_of_table([{"seed": i, "success": done, TIP: 1.0} for i, done in enumerate(given)])
+    (row,) = leaderboard(table, TIP)
+    assert (row.completed, row.failed, row.not_done) == (4, 0, 1)
+
+
 def test_a_leaderboard_without_chance_says_so(runs_of):
     runs = runs_of({"a": {("s", i): 1.0 for i in range(8)}})
     (row,) = leaderboard(runs, TIP)

@@ -162,6 +162,19 @@ def spoil_json(folder):
     (folder / "metrics.json").write_text(text[: len(text) // 2])
 
 
+def empty_scenario(folder):
+    (folder / "scenario.yaml").write_bytes(b"")
+
+
+def change_a_letter(folder):
+    text = (folder / "scenario.yaml").read_text()
+    (folder / "scenario.yaml").write_text(text.replace("vprnn", "vprnm", 1))
+
+
+def lose_scenario(folder):
+    (folder / "scenario.yaml").unlink()
+
+
 def lose_file(folder):
     (folder / "metrics.json").unlink()
 
@@ -177,17 +190,48 @@ def change(folder, key, value):
     (folder / "metrics.json").write_text(json.dumps(sealed(summary)))
 
 
+def lose_key(folder, key):
+    summary = read_sealed(folder / "metrics.json")
+    del summary["provenance"][key]
+    (folder / "metrics.json").write_text(json.dumps(sealed(summary)))
+
+
+def test_other_code_is_named(copy, whole, capsys):
+    folder = copy / read_table(whole)["folder"][2].as_py()
+    provenance = read_sealed(folder / "metrics.json")["provenance"]
+    change(folder, "packages", {**provenance["packages"], "mujoco": "3.0.0", "rerun-sdk": "0.1"})
+    change(folder, "code_sha256", "0" * 64)
+    compare(batch(copy, resume=True), runner=Counting())
+    now = provenance["packages"]["mujoco"]
+    count = read_table(whole).num_rows
+    told = f"1 of {count} runs were made by other code (mujoco 3.0.0 not {now}) and are run again"
+    assert capsys.readouterr().err == f"surgsim: {told}\n"
+
+
 @pytest.mark.parametrize(
     "spoil",
     [
         spoil_json,
+        empty_scenario,
+        change_a_letter,
+        lose_scenario,
         lose_file,
         lose_folder,
-        lambda folder: change(folder, "commit", "0" * 40),
-        lambda folder: change(folder, "surgsim", "0.0.0"),
+        lambda folder: change(folder, "code_sha256", "0" * 64),
+        lambda folder: lose_key(folder, "code_sha256"),
         lambda folder: change(folder, "scenario_sha256", "0" * 64),
     ],
-    ids=["half a file", "no file", "no folder", "another commit", "another version", "another scenario"],
+    ids=[
+        "half a file",
+        "empty scenario",
+        "changed scenario",
+        "no scenario",
+        "no file",
+        "no folder",
+        "other code",
+        "no word of the code",
+        "another scenario",
+    ],
 )
 def test_what_is_not_whole_or_not_of_this_code_is_run_again(copy, whole, spoil):
     folder = copy / read_table(whole)["folder"][2].as_py()
@@ -202,7 +246,7 @@ def test_what_a_killed_run_left_is_neither_counted_nor_kept(copy, whole):
     folder = copy / read_table(whole)["folder"][5].as_py()
     draft = folder.parent / f".{folder.name}.abc.part"
     folder.rename(draft)
-    (copy / ".suite.json.x.part").write_text("half")
+    (copy / ".suite.json.x.partial").write_text("half")
     (copy / ".runs.parquet.x.partial").write_text("half")
     runner = Counting()
     table = compare(batch(copy, resume=True), runner=runner)
@@ -220,9 +264,16 @@ def test_a_recording_that_is_wanted_and_missing_is_made(tmp_path):
     recording = second["recording"][0].as_py()
     assert recording == "runs/circle_lwr4plus/pinv/base-seed0/recording.rrd"
     assert (out / recording).is_file()
+    wanted = batch(out, suite=suite.model_copy(update={"record": True}), resume=True)
     runner = Counting()
-    compare(batch(out, suite=suite.model_copy(update={"record": True}), resume=True), runner=runner)
+    compare(wanted, runner=runner)
     assert runner.folders == []
+    content = (out / recording).read_bytes()
+    for damaged in (b"", content[:-1], content[:-1] + bytes([content[-1] ^ 1])):
+        (out / recording).write_bytes(damaged)
+        runner = Counting()
+        compare(wanted, runner=runner)
+        assert runner.folders == [str((out / recording).parent)]
 
 
 def test_runs_that_cannot_start_are_rows(tmp_path):
@@ -332,7 +383,7 @@ def test_a_full_disk_is_an_error_and_the_rest_can_be_run_later(whole, tmp_path, 
                 raise OSError(errno.ENOSPC, "No space left on device")
             real(source, target)
 
-        patch.setattr("surgsim.runs.folder.os.rename", rename)
+        patch.setattr("surgsim.runs.exchange.os.rename", rename)
         with pytest.raises(DiskError, match="No space left on device"):
             compare(batch(out), runner=here)
     assert len(list(out.glob("runs/*/*/*/metrics.json"))) == 3
@@ -413,15 +464,8 @@ def test_kill_9_of_the_whole_command_at_a_random_moment(whole, tmp_path):
     assert not list(out.rglob(".*"))
 
 
-def unshare_works():
-    command = ["unshare", "-rm", "mount", "-t", "tmpfs", "tmpfs", "/tmp"]
-    return (
-        shutil.which("unshare") is not None and subprocess.run(command, capture_output=True).returncode == 0
-    )
-
-
 @pytest.mark.slow
-@pytest.mark.skipif(not unshare_works(), reason="this system lets us mount no small disk")
+@pytest.mark.needs("mount")
 def test_a_disk_that_is_really_full(whole, tmp_path):
     """On a disk of 40 KiB, made larger for the second call."""
     script, disk = tmp_path / "script.py", tmp_path / "disk"

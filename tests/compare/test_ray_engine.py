@@ -15,8 +15,6 @@ from surgsim.compare.suite import SuiteConfig
 from surgsim.compare.table import MACHINE_COLUMNS, read_table
 from surgsim.compare.workers import Done
 
-pytest.importorskip("ray", reason="needs surgsim[ray]")
-
 SHORT = (
     "theatre=false",
     "task.ramp_s=0.1",
@@ -152,7 +150,17 @@ def test_without_ray_the_message_says_what_to_install(capsys, monkeypatch, tmp_p
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.needs("ray")
+def test_a_cluster_of_two_nodes_gives_the_table_of_one_process(run_script, tmp_path):
+    small = suite("0:2", 0.3)
+    expected = compare(Batch(suite=small, folder=Path(), out=tmp_path / "here"), runner=here)
+    said = run_script(TWO_NODES, small.model_dump_json(), tmp_path / "ray", 1000)
+    assert said == {"rows": 4, "killed": 0, "nodes": 2}
+    assert kept(read_table(tmp_path / "ray")) == kept(expected)
+
+
 @pytest.mark.slow
+@pytest.mark.needs("ray")
 def test_two_nodes_one_killed_give_the_table_of_one_process(run_script, tmp_path):
     small = suite("0:3", 20.0)  # a shorter run ends before its worker notices the death of its node
     expected = compare(Batch(suite=small, folder=Path(), out=tmp_path / "here"), runner=here)
@@ -161,7 +169,7 @@ def test_two_nodes_one_killed_give_the_table_of_one_process(run_script, tmp_path
     assert kept(read_table(tmp_path / "ray")) == kept(expected)
 
 
-@pytest.mark.slow
+@pytest.mark.needs("ray")
 def test_what_fails_on_a_node_is_a_row(run_script, scenario, tmp_path):
     jobs = [
         {

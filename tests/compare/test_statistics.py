@@ -10,7 +10,8 @@ from surgsim.compare.intervals import (
     percentile,
     proportion_interval,
 )
-from surgsim.compare.statistics import Verdict, compare_all, compare_pair
+from surgsim.compare.statistics import compare_all, compare_pair
+from surgsim.compare.verdict import Verdict
 from surgsim.errors import SurgsimError
 
 TIP = "tip_error_rms_mm"
@@ -74,8 +75,8 @@ def test_missing_pairs_and_undefined_values_are_named(runs_of):
 @pytest.mark.parametrize(
     ("a", "b", "sentence"),
     [
-        (line(1.0, 2.0), line(2.0, 2.5), "Too few pairs: only 2 seeds."),
-        (line(1.0), line(2.0), "Too few pairs: one seed."),
+        (line(1.0, 2.0), line(2.0, 2.5), "Too few pairs: only 2 seeds. Seen: a better than b by 0.750 mm."),
+        (line(1.0), line(2.0), "Too few pairs: one seed. Seen: a better than b by 1.00 mm."),
         (line("diverged"), line(2.0), "Too few pairs: none (1 a failed). Failed: a 1, b 0 of 1 pairs."),
         ({}, line(2.0), "Too few pairs: none (1 run of a missing)."),
     ],
@@ -194,6 +195,6 @@ def test_wilson_interval_against_scipy():
 
     for wins, n in ((0, 10), (7, 10), (10, 10)):
         expected = binomtest(wins, n).proportion_ci(method="wilson")
-        found = proportion_interval(wins / n, n)
+        found = proportion_interval(wins / n, [n])
         assert (found.low, found.high) == pytest.approx((expected.low, expected.high))
-    assert proportion_interval(1.0, 1).note == ONE_SEED
+    assert proportion_interval(1.0, [1]).note == ONE_SEED

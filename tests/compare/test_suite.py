@@ -228,6 +228,10 @@ def test_a_suite_is_told_from_a_scenario(write, tmp_path):
 def test_what_the_command_line_says_instead():
     suite = SuiteConfig(name="small", scenarios=("circle_lwr4plus",), controllers=("vprnn",), seeds="0:9")
     assert with_changes(suite, None, None, False) == suite
+    assert with_changes(suite, None, None, False, ["task.radius_m=0.01"]).settings == (
+        *suite.settings,
+        "task.radius_m=0.01",
+    )
     changed = with_changes(suite, ["pinv", "qp"], "3", True)
     assert (changed.controllers, changed.seeds, changed.record) == (("pinv", "qp"), "3", True)
     with pytest.raises(ScenarioError) as error:

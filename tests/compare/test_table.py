@@ -17,19 +17,27 @@ from surgsim.metrics.catalog import METRICS
 from surgsim.recording.sealed import sealed
 
 TEXT = {"run_id", "suite", "scenario", "controller", "parameters", "outcome", "outcome_detail"}
-TEXT |= {"scenario_sha256", "surgsim_version", "commit", "machine", "folder", "recording"}
+TEXT |= {"success_reason", "exceeded"}
+TEXT |= {"scenario_sha256", "code_sha256", "surgsim_version", "commit", "machine", "folder", "recording"}
+
+
+HELD = {"metric": "rcm_error_max_mm", "value": 9.0, "most": 5.0, "source": "x", "exceeded": True}
 
 
 def summary(**changes):
     made = {
-        "schema_version": 1,
+        "schema_version": 2,
         "scenario": "circle",
         "controller": "vprnn",
         "seed": 3,
         "outcome": {"name": "completed", "sentence": "", "t_s": 0.1 + 0.2, "detail": "", "data": {}},
+        "success": False,
+        "success_reason": "made up",
+        "thresholds": [HELD, {**HELD, "metric": "tip_error_max_mm", "exceeded": False}],
         "metrics": {name: 1.0 / (3 + i) for i, name in enumerate(METRICS)},
         "provenance": {
             "surgsim": "1.0",
+            "code_sha256": "cd",
             "commit": None,
             "machine": "Linux x86_64",
             "scenario_sha256": "ab",
@@ -73,6 +81,7 @@ def test_every_column_has_its_type(table):
     types = {field.name: field.type for field in table.schema}
     assert {name for name, kind in types.items() if kind == pa.string()} == TEXT
     assert types.pop("seed") == pa.int64()
+    assert types.pop("success") == pa.bool_()
     numbers = {name for name, kind in types.items() if kind == pa.float64()}
     assert numbers == {*METRICS, "outcome_t_s", "wall_time_s"}
     assert set(MACHINE_COLUMNS) == {
@@ -88,6 +97,12 @@ def test_a_failed_run_is_a_row_without_metrics(table):
     assert (row["outcome"], row["outcome_detail"]) == ("worker_died", 'exit, "code"\n-9')
     assert [row[name] for name in METRICS] == [None] * len(METRICS)
     assert (row["seed"], row["wall_time_s"]) == (3, 0.5)
+
+
+def test_success_stands_beside_the_outcome(table):
+    row = table.to_pylist()[0]
+    assert (row["outcome"], row["success"], row["success_reason"]) == ("completed", False, "made up")
+    assert row["exceeded"] == "rcm_error_max_mm"
 
 
 def test_what_is_not_defined_is_null_and_the_rest_is_exact(table):
@@ -134,11 +149,11 @@ def test_numbers_survive_the_csv_bit_for_bit(results, tmp_path):
         ('{"scenario": "circle", "sha256": "00"}', "its sha256 differs"),
         (json.dumps(sealed({"scenario": "circle"})), "'schema_version'"),
         (
-            json.dumps(sealed({"schema_version": 2, "outcome": {"name": "completed"}})),
-            "schema_version 2, but",
+            json.dumps(sealed({"schema_version": 3, "outcome": {"name": "completed"}})),
+            "schema_version 3, but",
         ),
         (
-            json.dumps(sealed({"schema_version": 1, "outcome": {"name": "finished"}})),
+            json.dumps(sealed({"schema_version": 2, "outcome": {"name": "finished"}})),
             "is not a run's outcome",
         ),
         ("[]", "it holds no object"),
@@ -210,7 +225,7 @@ def test_shards_that_end_at_the_same_time_do_not_disturb_each_other(results, tmp
 def test_every_column_is_documented():
     whole = (Path(__file__).parents[2] / "docs" / "batch.md").read_text()
     page = whole.split("## What a results folder holds")[1]
-    kinds = {pa.string(): "text", pa.int64(): "integer", pa.float64(): "number"}
-    documented = dict(re.findall(r"^\| `(\w+)` \| (text|integer|number) \| .+ \|$", page, re.M))
+    kinds = {pa.string(): "text", pa.int64(): "integer", pa.float64(): "number", pa.bool_(): "truth value"}
+    documented = dict(re.findall(r"^\| `(\w+)` \| (text|integer|number|truth value) \| .+ \|$", page, re.M))
     assert documented == {field.name: kinds[field.type] for field in schema() if field.name not in METRICS}
     assert [name for name in MACHINE_COLUMNS if f"`{name}`" not in whole] == []

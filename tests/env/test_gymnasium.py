@@ -1,14 +1,12 @@
 """The Gymnasium environments pass Gymnasium's own checker, warnings being errors."""
 
+import gymnasium
 import numpy as np
 import pytest
+from gymnasium.utils.env_checker import check_env
 
-gymnasium = pytest.importorskip("gymnasium")
-
-from gymnasium.utils.env_checker import check_env  # noqa: E402
-
-from surgsim.env.gymnasium import SurgsimEnv, environment_id  # noqa: E402
-from surgsim.scenario.load import shipped  # noqa: E402
+from surgsim.env.gymnasium import SurgsimEnv, environment_id
+from surgsim.scenario.load import shipped
 
 STOP = "safety.tip_error_max_m=0.001"
 

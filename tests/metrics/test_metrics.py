@@ -1,12 +1,14 @@
 """Every metric on made traces whose values are known."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from surgsim.errors import Outcome
-from surgsim.metrics.catalog import METRICS, compute_metrics
+from surgsim.metrics.catalog import METRICS, compute_metrics, evaluate
+from surgsim.metrics.metric import Undefined
 from surgsim.metrics.timing import TIMING_METRICS
 from surgsim.simulate.loop import simulate
 
@@ -102,3 +104,30 @@ def test_a_trace_of_one_row_has_metrics(trace_of):
     trace = trace_of(1, tip_error=0.002)
     assert _value(trace, "tip_error_max_mm") == pytest.approx(2.0)
     assert math.isnan(_value(trace, "sparc"))
+
+
+def _raising(error):
+    def compute(trace):
+        raise error
+
+    return compute
+
+
+@pytest.mark.parametrize(
+    ("error", "reason"),
+    [
+        (Undefined("the arm is singular"), "the arm is singular"),
+        (np.linalg.LinAlgError("no\n inverse"), "LinAlgError: no inverse"),
+        (KeyError("q8_rad"), "KeyError: 'q8_rad'"),
+    ],
+)
+def test_a_metric_that_raises_is_none_with_its_reason_and_costs_no_other(
+    trace_of, monkeypatch, error, reason
+):
+    trace = trace_of(4, tip_error=[0.003, 0.004, 0.0, 0.0])
+    plain = evaluate(trace)
+    monkeypatch.setitem(METRICS, "sparc", replace(METRICS["sparc"], compute=_raising(error)))
+    found = evaluate(trace)
+    assert found.undefined == {**plain.undefined, "sparc": reason}
+    assert found.values == {**plain.values, "sparc": None}
+    assert compute_metrics(trace) == found.values

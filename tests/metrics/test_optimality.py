@@ -5,6 +5,7 @@ import pytest
 
 from surgsim.control.self_motion import SelfMotion
 from surgsim.metrics.catalog import METRICS
+from surgsim.metrics.metric import Undefined
 from surgsim.metrics.optimality import (
     SAMPLES,
     _search,
@@ -123,3 +124,53 @@ def test_the_runs_before_it_change_nothing(curve):
 
 def test_it_is_a_metric_of_which_more_is_better():
     assert METRICS["manipulability_optimality"].lower_is_better is False
+
+
+def test_between_samples_a_moving_tip_does_not_take_it_above_one(arm, curve):
+    """Where mu* changes along the path, a mu near it is above a mu* interpolated between distant ticks."""
+    q = max(curve, key=lambda point: point.mu).q
+    trace = _run("task.radius_m=0.05", "task.duration_s=3.0", q=q, controller="gradient")
+    rows, best = attainable_manipulability(trace, 3)
+    over = trace["manipulability"] / np.interp(np.arange(len(trace)), rows, best)
+    assert over.max() > 1.0, "the case is none"
+    assert 0.9 < manipulability_optimality(trace) <= 1.0
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_shaft_off_the_trocar_is_not_above_one_either(arm, random_q, seed):
+    """With an RCM error the run is held against what it could reach on its own shaft line."""
+    rng = np.random.default_rng(seed)
+    trace = _held(_run("task.radius_m=0.001"), 4)
+    data = trace.data.copy()
+    at = {name: i for i, name in enumerate(trace.columns)}
+    for row in data:
+        q = random_q(rng)
+        kin = arm.kinematics(q)
+        side = kin.R_WT[:, :2] @ rng.normal(size=2)
+        trocar = kin.p_WT - 0.15 * kin.R_WT[:, 2] + 0.01 * side / np.linalg.norm(side)
+        row[[at[f"q{i + 1}_rad"] for i in range(7)]] = q
+        points = {"tip": kin.p_WT, "wrist": kin.p_WT - 0.4 * kin.R_WT[:, 2], "trocar": trocar}
+        for name, point in points.items():
+            row[[at[f"{name}_{axis}_m"] for axis in "xyz"]] = point
+        row[at["manipulability"]] = np.prod(np.linalg.svd(kin.Jv_WT, compute_uv=False))
+    turned = Trace(data, trace.blocks, trace.meta)
+    rows, best = attainable_manipulability(turned)
+    assert (turned["manipulability"][rows] <= best).all()
+    for row, top in zip(rows, best, strict=True):  # the run's own configuration is on its manifold
+        tip, here = turned.block("tip")[row], turned.block("q")[row]
+        axis = turned.block("wrist")[row] - tip
+        axis /= np.linalg.norm(axis)
+        centre = tip + ((turned.block("trocar")[row] - tip) @ axis) * axis
+        point = SelfMotion(arm, margin_rad=0.0).project(here, tip, centre)
+        np.testing.assert_allclose(point.q, here, atol=1e-9)
+        assert top >= point.mu * (1.0 - 1e-9)
+
+
+def test_a_tip_in_the_port_all_along_has_no_optimality():
+    trace = _held(_run("task.radius_m=0.001"), 3)
+    data = trace.data.copy()
+    at = {name: i for i, name in enumerate(trace.columns)}
+    for axis in "xyz":
+        data[:, at[f"trocar_{axis}_m"]] = data[:, at[f"tip_{axis}_m"]]
+    with pytest.raises(Undefined, match="the tip is in the port all along"):
+        manipulability_optimality(Trace(data, trace.blocks, trace.meta))

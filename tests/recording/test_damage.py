@@ -4,11 +4,11 @@ import struct
 import time
 from pathlib import Path
 
-import numpy as np
 import pytest
 import rerun as rr
 
 from surgsim.errors import RecordingError
+from surgsim.recording.encoding import encode
 from surgsim.recording.framing import check_framing
 from surgsim.recording.read import read_recording
 
@@ -72,15 +72,15 @@ def test_flipped_bytes(recording: Path, tmp_path: Path, place: str) -> None:
     assert refusal(path)
 
 
-def test_a_changed_number_is_noticed(recording: Path, tmp_path: Path, trace) -> None:
-    """One bit of one value: the file still reads as a recording."""
-    data = recording.read_bytes()
-    value = next(value for value in map(np.float64.tobytes, trace.block("q").ravel()) if value in data)
-    changed = bytes([value[0] ^ 1]) + value[1:]
+def test_a_changed_bit_of_the_packed_columns_is_noticed(recording: Path, tmp_path: Path, trace) -> None:
+    """The file still reads as a recording."""
+    data, packed = recording.read_bytes(), encode(trace.data)
+    middle = len(packed) // 2
+    place = data.index(packed[middle : middle + 16])
     path = tmp_path / "changed.rrd"
-    path.write_bytes(data.replace(value, changed, 1))
+    path.write_bytes(data[:place] + bytes([data[place] ^ 1]) + data[place + 1 :])
     check_framing(path)
-    assert refusal(path)
+    assert refusal(path) == "damaged recording: it does not hold what was written"
 
 
 def test_a_foreign_recording(tmp_path: Path) -> None:

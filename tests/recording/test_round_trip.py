@@ -95,11 +95,14 @@ def test_reading_does_not_import_rerun() -> None:
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
 
 
-def test_a_recording_with_a_later_schema_version(
-    trace: Trace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize("version", [1, 3])
+def test_a_recording_of_another_schema_version(
+    trace: Trace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, version: int
 ) -> None:
-    monkeypatch.setattr("surgsim.recording.layout.SCHEMA_VERSION", 2)
-    write_recording(tmp_path / "r.rrd", trace, {})
+    path = tmp_path / "r.rrd"
+    monkeypatch.setattr("surgsim.recording.layout.SCHEMA_VERSION", version)
+    write_recording(path, trace, {})
     monkeypatch.undo()
-    with pytest.raises(RecordingError, match="schema version 2; this surgsim reads 1"):
-        extract(tmp_path / "r.rrd")
+    with pytest.raises(RecordingError) as caught:
+        read_recording(path)
+    assert str(caught.value) == f"{path}: recording of schema version {version}; this surgsim reads 2"

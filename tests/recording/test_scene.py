@@ -85,5 +85,5 @@ def test_the_scene_is_recorded(recording) -> None:
     bodies = {"world", "base", *(f"link{i}" for i in range(1, 8)), "instrument", "port", "patient"}
     assert {f"/scene/{body}" for body in bodies} <= paths
     assert {"/scene/desired_path", "/scene/actual_path", "/scene/tip", "/scene/rcm_error_x20"} <= paths
-    assert {"/trace_limits/q", "/trace_limits/v", "/trace_limits/tau", "/errors_mm", "/log"} <= paths
+    assert {"/signal_limits/q", "/signal_limits/v", "/signal_limits/tau", "/errors_mm", "/log"} <= paths
     assert RrdReader(recording).blueprints()

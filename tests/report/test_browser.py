@@ -3,16 +3,14 @@
 import re
 import shutil
 
+import left_out
 import pytest
+from playwright import sync_api as playwright
 
 from surgsim.report.write import write_report
 
-playwright = pytest.importorskip(
-    "playwright.sync_api", reason="playwright, of the dev extra, is not installed"
-)
-NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
-CHROMIUM = next(filter(None, map(shutil.which, NAMES)), None)
-pytestmark = pytest.mark.skipif(CHROMIUM is None, reason=f"none of {', '.join(NAMES)} is on the PATH")
+CHROMIUM = next(filter(None, map(shutil.which, left_out.BROWSERS)), None)
+pytestmark = pytest.mark.needs("chromium")
 
 ARGUMENTS = ["--no-sandbox", "--disable-gpu", "--disable-background-networking"]
 CONTRAST = """() => {
@@ -89,49 +87,50 @@ def open_page(browser):
     for context in contexts:
         context.close()
     assert complaints == []
-    assert len([url for url in asked if not url.startswith("data:,")]) == len(contexts)  # the page alone
+    assert len([url for url in asked if not url.startswith("data:")]) == len(contexts)  # the page alone
 
 
-def column(page, name):
+def column(page, name, board=".main"):
     """Numbers of a column of the leaderboard, from top to bottom; None where there is none."""
-    index = page.locator(".board thead th").evaluate_all(
+    index = page.locator(f"{board} thead th").evaluate_all(
         "(cells, name) => cells.findIndex((cell) => cell.firstChild.dataset.name === name)", name
     )
-    cells = page.locator(f".board tbody tr > :nth-child({index + 1})")
+    cells = page.locator(f"{board} tbody tr > :nth-child({index + 1})")
     return [float(v) if v else None for v in cells.evaluate_all("cells => cells.map(c => c.dataset.value)")]
 
 
 @pytest.mark.parametrize(("name", "best_first"), [("tip_error_rms_mm", min), ("manipulability_mean", max)])
 def test_pressing_a_heading_sorts_best_first_and_again_worst_first(open_page, address, name, best_first):
     page = open_page(address)
-    heading = page.locator(f'.board button[data-name="{name}"]')
+    heading = page.locator(f'.main button[data-name="{name}"]')
     heading.click()
     first = column(page, name)
     assert first == sorted(first, reverse=best_first is max)
     assert len(set(first)) == 4
     heading.click()
     assert column(page, name) == first[::-1]
-    sorts = page.locator(".board th[aria-sort]").evaluate_all("all => all.map(th => th.ariaSort)")
+    sorts = page.locator(".main th[aria-sort]").evaluate_all("all => all.map(th => th.ariaSort)")
     assert sorted(sorts)[:1] == ["ascending" if best_first is max else "descending"]
     assert sorts.count("none") == len(sorts) - 1
 
 
 def test_the_keyboard_sorts_too_and_what_has_no_value_stays_last(open_page, address):
     page = open_page(address)
-    button = page.locator('.board button[data-name="convergence_time_s"]')
+    page.locator("#leaderboard summary").click()
+    button = page.locator('.all button[data-name="convergence_time_s"]')
     for key in ("Enter", "Space"):
         button.focus()
         page.keyboard.press(key)
-        values = column(page, "convergence_time_s")
+        values = column(page, "convergence_time_s", ".all")
         assert values[-1] is None
         assert values[:-1] == sorted(values[:-1], reverse=key == "Space")
-    assert page.locator("#sorted").inner_text() == "Sorted by convergence_time_s, descending."
+    assert page.locator("#sorted").inner_text() == "Sorted by time to converge [s], descending."
 
 
 def test_names_sort_as_text(open_page, address):
     page = open_page(address)
-    page.locator('.board button[data-name="controller"]').click()
-    names = page.locator(".board tbody th").all_inner_texts()
+    page.locator('.main button[data-name="controller"]').click()
+    names = page.locator(".main tbody th").all_inner_texts()
     assert len(names) == 4
     assert names == page.evaluate("names => [...names].sort((a, b) => a.localeCompare(b))", names)
 
@@ -143,8 +142,8 @@ def test_nothing_overflows_sideways(open_page, address, width):
     assert page.evaluate("document.documentElement.scrollWidth") == width
     wide = page.locator("main > section").evaluate_all("all => all.map(s => s.getBoundingClientRect().right)")
     assert max(wide) <= width
-    board = page.locator(".board").evaluate("box => [box.scrollWidth, box.clientWidth]")
-    assert board[0] > board[1]  # the table scrolls inside its box
+    board = page.locator(".main").evaluate("box => [box.scrollWidth, box.clientWidth]")
+    assert (board[0] > board[1]) == (width < 1000)  # on a phone the table scrolls inside its box
 
 
 def test_text_in_figures_can_be_read_on_a_phone(open_page, address):
@@ -183,3 +182,37 @@ def test_links_to_recordings_are_folded_in_the_list_of_runs(open_page, address):
     page.locator("#runs summary").click()
     assert link.is_visible()
     assert link.evaluate("a => a.protocol") == "file:"
+
+
+def test_what_is_read_first_is_above_the_fold_and_the_rest_is_folded(open_page, address):
+    page = open_page(address, viewport={"width": 1280, "height": 900})
+    lead, picture = page.locator("header .lead"), page.locator("header img")
+    assert lead.inner_text().startswith(("rcm_inverse_dynamics wins", "javascript:alert(1) wins"))
+    for seen in (lead, picture, page.locator(".failing")):
+        box = seen.bounding_box()
+        assert box["y"] + box["height"] < 900
+    assert picture.evaluate("image => image.complete && image.naturalWidth > 0")
+    assert page.evaluate("document.documentElement.scrollHeight") < 6000
+    assert page.locator("details[open]").count() == 0
+
+
+def test_a_link_to_something_folded_unfolds_it(open_page, address):
+    page = open_page(f"{address}#scenario-1")
+    assert page.locator("#scenario-1").evaluate("fold => fold.open")
+    page.evaluate("location.hash = 'scenario-0'")
+    page.wait_for_function("document.getElementById('scenario-0').open")
+
+
+def test_paper_shows_what_matters_and_no_more(open_page, address):
+    page = open_page(address)
+    page.evaluate("dispatchEvent(new Event('beforeprint'))")
+    unfolded = page.locator("details[open] > summary").all_inner_texts()
+    assert [text.split(" [")[0] for text in unfolded] == [
+        "Every pair by RCM error, RMS",
+        "How the figures are made",
+        "What the metrics mean, and which differences matter",
+    ]
+    page.evaluate("dispatchEvent(new Event('afterprint'))")
+    assert page.locator("details[open]").count() == 0
+    page.emulate_media(media="print")
+    assert page.locator("#methods h3").first.is_visible()  # without the script's help

@@ -17,8 +17,6 @@ from surgsim.errors import Outcome, RecordingError, SurgsimError
 from surgsim.metrics.catalog import METRICS
 from surgsim.recording.read import Recorded
 from surgsim.report import html, series
-from surgsim.report.figures.scale import Scale
-from surgsim.report.figures.svg import tick_text
 from surgsim.report.write import write_report
 
 VOID = {"meta", "link", "br", "wbr", "hr", "img", "input"}
@@ -64,7 +62,7 @@ def made(request, made_results):
 
 def test_every_section_is_there_and_linked(made):
     _, _, page = made
-    wanted = {"leaderboard", "failures", "ranking", "pairs", "runs", "methods", "versions", "scenario-2"}
+    wanted = {"leaderboard", "failures", "ranking", "pairs", "scenarios", "scenario-2", "runs", "methods"}
     assert wanted <= set(page.ids)
     assert len(set(page.ids)) == len(page.ids)
     anchors = [link[1:] for link in page.links if link.startswith("#")]
@@ -74,7 +72,7 @@ def test_every_section_is_there_and_linked(made):
 def test_figures_of_every_kind_are_there(made):
     _, _, page = made
     said = [attrs["aria-label"] for tag, attrs in page.tags if tag == "svg" and "aria-label" in attrs]
-    assert sum(label.startswith("Box plot of rcm error rms [mm]") for label in said) == 3
+    assert sum(label.startswith("Box plot of RCM error, RMS [mm]") for label in said) == 3
     assert sum(label.startswith("Box plot of manipulability") for label in said) >= 6
     assert sum(" against disturbances.0.mass_kg" in label for label in said) == 9
     assert sum(label.startswith("share of runs with score") for label in said) == 3
@@ -82,7 +80,7 @@ def test_figures_of_every_kind_are_there(made):
 
 def test_nothing_is_fetched_from_elsewhere(made):
     _, text, page = made
-    assert all(link.startswith(("./", "#", "data:,")) for link in page.links)
+    assert all(link.startswith(("./", "#", "data:,", "data:image/jpeg;base64,")) for link in page.links)
     assert not re.search(r"@import|url\(|fetch\(|XMLHttpRequest|<iframe|<object|<embed", text)
     assert "default-src 'none'" in text
 
@@ -121,9 +119,9 @@ def test_failures_stand_beside_the_figures(made):
     table = pq.read_table(folder / "runs.parquet").to_pylist()
     failed = sum(row["outcome"] != "completed" for row in table)
     text = " ".join("".join(page.text).split())
-    assert f"{failed}failed" in text
+    assert f"{failed} failed" in text
     assert failed > 20
-    for outcome in ("rcm_limit", "diverged"):
+    for outcome in ("rcm limit", "diverged"):
         assert outcome in text
 
 
@@ -258,24 +256,6 @@ def test_command_line(made_results, tmp_path):
     refused = subprocess.run([*command, str(tmp_path)], capture_output=True, text=True, check=False)
     assert refused.returncode == 2
     assert refused.stderr.startswith(f"surgsim: {tmp_path} holds no runs.parquet")
-
-
-@pytest.mark.parametrize(
-    ("values", "log", "ticks"),
-    [
-        ((0.0, 1.0), False, ["0", "0.2", "0.4", "0.6", "0.8", "1"]),
-        ((0.402, 0.411), False, ["0.402", "0.404", "0.406", "0.408", "0.41"]),
-        ((0.002, 12.0), True, ["0.01", "0.1", "1", "10"]),
-        ((1e-9, 10.0), True, ["1e−9", "1e−6", "0.001", "1"]),
-        ((3.0, 3.0), False, ["2.9", "3", "3.1"]),
-        ((-2.0, 5.0), False, ["−2", "0", "2", "4"]),
-    ],
-)
-def test_ticks_are_round_and_few(values, log, ticks):
-    scale = Scale.over(values, 0, 100)
-    assert scale.log is log
-    assert [tick_text(tick) for tick in scale.ticks()] == ticks
-    assert all(0 <= scale.at(value) <= 100 for value in values)
 
 
 # Machado, Oliveira and Fernandes, IEEE TVCG 15(6), 2009: severity 1, on linear RGB.

@@ -83,10 +83,10 @@ def test_panels_show_every_disturbance_with_its_failures(swept):
     said = [unescape(label) for label in re.findall(r'role="img" aria-label="([^"]*)"', section)]
     assert said == [
         f"{metric} against {label}, 2 controllers, {count} fail."
-        for metric in ("rcm error rms [mm]", "tip error rms [mm]")
+        for metric in ("RCM error, RMS [mm]", "tip error, RMS [mm]")
         for label, count in (("payload <b>[kg]</b>", 1), ("delay", 0))
     ]
-    panel = section.split('aria-label="rcm error rms')[1]
+    panel = section.split('aria-label="RCM error, RMS')[1]
     texts = [unescape(text) for text in re.findall(r"<text[^>]*>(.*?)</text>", panel.split("</svg>")[0])]
     assert {">5 mm", "1/3", "off", "0.5", "1", "2"} <= set(texts)
 
@@ -99,7 +99,7 @@ def test_a_failure_without_a_disturbance_is_the_first(made_up, tmp_path):
 
 def test_sweeps_are_not_drawn_a_second_time_with_the_scenario(swept):
     assert "<b>[kg]</b>" not in swept
-    assert " against payload," not in _section(swept, "scenario-0")
+    assert " against payload," not in _section(swept, "scenarios")
     assert '<a href="#robustness">' in swept
     assert '<a href="#frontier">' not in swept
 
@@ -120,7 +120,7 @@ def test_maps_count_failures_in_their_cells(mapped):
     section = _section(mapped, "frontier")
     said = [unescape(label) for label in re.findall(r'role="img" aria-label="([^"]*)"', section)]
     told = "over delay [ms] and gain & more, 6 cells; 3 of 12 runs failed."
-    assert said == 4 * [f"rcm error rms [mm] {told}"] + 4 * [f"tip error rms [mm] {told}"]
+    assert said == 4 * [f"RCM error, RMS [mm] {told}"] + 4 * [f"tip error, RMS [mm] {told}"]
     first = section.split("</svg>")[0]
     assert first.count('class="heat"') == 5
     assert first.count('class="lost"') == 1

@@ -1,5 +1,6 @@
 """A run's folder is written whole or not at all, and its scenario gives the run again."""
 
+import hashlib
 import json
 import os
 import signal
@@ -36,7 +37,7 @@ def test_the_folder_holds_the_run(result, folder, scenario):
     assert _names(folder) == FILES - {"recording.rrd"}
     assert _names(folder.parent) == {"run"}
     summary = json.loads((folder / "metrics.json").read_text())
-    assert summary["schema_version"] == 1
+    assert summary["schema_version"] == 2
     assert (summary["scenario"], summary["controller"], summary["seed"]) == ("circle_lwr4plus", "vprnn", 7)
     assert summary["outcome"]["name"] == "completed"
     assert summary["outcome"]["t_s"] == pytest.approx(0.3)
@@ -49,6 +50,26 @@ def test_its_scenario_run_again_gives_the_same_trace(result, folder):
     again = load_scenario(str(folder / "scenario.yaml"))
     assert again.seed == 7
     assert simulate(again).equals(result.trace)
+
+
+def test_its_summary_states_size_and_hash_of_every_other_file(tmp_path, scenario):
+    run_to_folder(scenario(), tmp_path / "run")
+    stated = json.loads((tmp_path / "run" / "metrics.json").read_text())["files"]
+    assert stated == {
+        name: {"bytes": len(content), "sha256": hashlib.sha256(content).hexdigest()}
+        for name in FILES - {"metrics.json"}
+        for content in [(tmp_path / "run" / name).read_bytes()]
+    }
+
+
+def test_a_run_that_starts_singular_is_written_with_the_reason_of_its_missing_metric(tmp_path, scenario):
+    changes = ("trocar=null", "task.start_m=null", "start.q_rad=[0,0,0,0,0,0,0]")
+    result = run_to_folder(scenario(*changes), tmp_path / "run", record=False)
+    reason = "the arm is singular in this run: its self-motion cannot be followed"
+    summary = json.loads((tmp_path / "run" / "metrics.json").read_text())
+    assert summary["outcome"]["name"] == "infeasible"
+    assert summary["metrics"]["manipulability_optimality"] is None
+    assert summary["undefined"] == dict(result.undefined) == {"manipulability_optimality": reason}
 
 
 def test_an_earlier_run_is_replaced_as_a_whole(tmp_path, scenario):

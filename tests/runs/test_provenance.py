@@ -28,7 +28,20 @@ def test_a_clean_checkout_is_its_commit(checkout):
     assert re.fullmatch(CLEAN, commit_of(checkout))
 
 
-@pytest.mark.parametrize("name", ["README.md", "notes.txt", "runs/new.json", "surgsim/a.pyc"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        "README.md",
+        "notes.txt",
+        "runs/new.json",
+        "surgsim/a.pyc",
+        "surgsim/notes.txt",
+        "surgsim/cli/a.py",
+        "surgsim/report/a.py",
+        "scenarios/a.yaml",
+        "pyproject.toml",
+    ],
+)
 def test_what_cannot_change_a_result_does_not_count(checkout, name):
     (checkout / name).parent.mkdir(exist_ok=True)
     (checkout / name).write_text("new\n")
@@ -36,10 +49,11 @@ def test_what_cannot_change_a_result_does_not_count(checkout, name):
 
 
 @pytest.mark.parametrize(
-    "name", ["surgsim/a.py", "assets/a.xml", "scenarios/a.yaml", "pyproject.toml", "surgsim/new.py"]
+    "name", ["surgsim/a.py", "assets/a.xml", "surgsim/new.py", "surgsim/control/new.py", "assets/new.xml"]
 )
 def test_a_change_of_what_counts_is_told_by_its_hash(checkout, name):
     def with_content(text):
+        (checkout / name).parent.mkdir(exist_ok=True)
         (checkout / name).write_text(text)
         found = commit_of(checkout)
         assert re.fullmatch(DIRTY, found)

@@ -3,6 +3,7 @@
 import math
 import subprocess
 import sys
+import time
 from dataclasses import replace
 
 import numpy as np
@@ -25,6 +26,26 @@ def trace(scenario):
 def test_the_same_scenario_gives_the_same_trace_bit_for_bit(scenario, trace):
     assert simulate(scenario()).equals(trace)
     assert not simulate(scenario(*PAYLOAD)).equals(trace)
+
+
+def test_control_time_is_the_controllers_and_not_what_else_the_machine_does(scenario, monkeypatch):
+    setup = prepare(scenario())
+    tick, waits = setup.controller.tick, iter([time.sleep, _work])
+
+    def slowed(state, command):
+        next(waits, lambda _: None)(0.05)
+        return tick(state, command)
+
+    monkeypatch.setattr(setup.controller, "tick", slowed)
+    slept, worked, *_ = Simulation(setup).run()["control_time_s"]
+    assert slept < 0.04, "the time that the thread was not running is in it"
+    assert worked >= 0.05
+
+
+def _work(length_s):
+    end = time.thread_time() + length_s
+    while time.thread_time() < end:
+        pass
 
 
 def test_a_prepared_scenario_can_be_run_again(scenario, trace):

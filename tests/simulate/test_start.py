@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from surgsim.control.rcm import rcm_kinematics
-from surgsim.errors import UnreachableError
+from surgsim.errors import SurgsimError, UnreachableError
 from surgsim.models.config import InstrumentConfig, TrocarConfig
+from surgsim.plant.disturbances import DISTURBANCES
 from surgsim.scenario.load import load_scenario, shipped
 from surgsim.simulate.setup import prepare
 from surgsim.simulate.start import Reach, check_path, solve_start
@@ -52,6 +53,29 @@ def test_a_start_given_in_joints_is_taken_as_it_is_and_begins_the_path(scenario)
     setup = prepare(scenario(f"start.q_rad={q.tolist()}", "task.start_m=null"))
     np.testing.assert_array_equal(setup.q_start, q)
     np.testing.assert_allclose(setup.task.command(0.0).p_WTd, setup.arm.kinematics(q).p_WT, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("late", "starts"),
+    [
+        ("{type: push, start_s: 20.0}", "20"),
+        ("{type: push, start_s: 0.3}", "0.3"),
+        ("{type: guiding_hand, start_s: 0.9}", "0.4"),
+    ],
+)
+def test_a_disturbance_that_begins_after_the_end_is_refused(scenario, late, starts):
+    late = scenario(f"disturbances=[{{type: payload}}, {late}]")
+    text = f"short: disturbances.1 starts at {starts} s, the run ends at 0.3 s"
+    with pytest.raises(SurgsimError, match=re.escape(text.replace("short", late.name))):
+        prepare(late)
+    assert prepare(scenario("disturbances=[{type: push, start_s: 0.29}]"))
+
+
+def test_every_disturbance_with_a_start_says_when_it_begins():
+    timed = [name for name in DISTURBANCES.names() if "start_s" in DISTURBANCES.config(name).model_fields]
+    assert timed == ["guiding_hand", "push"]
+    for name in timed:
+        assert DISTURBANCES.config(name)(start_s=7.0).begins_s > 6.0, name
 
 
 SPIRAL = "task={type: spiral, start_m: [0.02, 0.55, 0.02], length_m: 0.3, turns: 1.0, normal: [0, 0, -1]}"

@@ -4,12 +4,12 @@ import importlib
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
-from importlib.metadata import entry_points
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from surgsim.errors import SurgsimError, unknown_name
+from surgsim.errors import SurgsimError, told, unknown_name
+from surgsim.plugins import offers
 
 GROUP = "surgsim.policies"
 Policy = Callable[[Mapping[str, NDArray[np.float64]]], ArrayLike]
@@ -71,12 +71,27 @@ def find_policy(name: str) -> Policy:
     module, _, attribute = places[name].partition(":")
     try:
         policy = getattr(importlib.import_module(module), attribute)
-    except (ImportError, AttributeError) as error:
-        raise SurgsimError(f"policy '{name}' does not load: {error}") from error
+    except Exception as error:
+        if name in _SHIPPED:
+            raise  # a bug of ours
+        raise SurgsimError(f"{_called(name)} does not load: {told(error)}") from error
     if not callable(policy):
-        raise SurgsimError(f"policy '{name}' ({places[name]}) cannot be called")
+        raise SurgsimError(f"{_called(name)} ({places[name]}) cannot be called")
     return policy  # type: ignore[no-any-return]
 
 
+def policy_summary(name: str) -> str:
+    """First line of the policy's docstring, or why it does not load."""
+    try:
+        return (find_policy(name).__doc__ or "").strip().split("\n")[0]
+    except SurgsimError as error:
+        return str(error)
+
+
 def _places() -> dict[str, str]:
-    return {**{point.name: point.value for point in entry_points(group=GROUP)}, **_SHIPPED}
+    return {**{name: offer.place for name, offer in offers(GROUP).items()}, **_SHIPPED}
+
+
+def _called(name: str) -> str:
+    """What messages call the policy `name`, with the package that brings it."""
+    return f"policy '{name}' {offers(GROUP)[name].origin}" if name in offers(GROUP) else f"policy '{name}'"

@@ -42,7 +42,7 @@ class PassiveQpConfig(PartConfig):
         plane_gain_per_s: How fast the tip may approach a wall [1/s].
         tip_speed_max_m_per_s: Limit of the commanded tip speed along each axis, taken up by the slack [m/s].
         lead_max_m: How far the integrated tip reference may lead the measured tip [m].
-        solver: `daqp` (native, warm) or another solver of qpsolvers by name.
+        solver: `daqp`, `osqp`, or another solver that qpsolvers finds installed, by its name.
     """
 
     type: Literal["passive_qp"] = "passive_qp"

@@ -5,7 +5,7 @@ from typing import Annotated, Any, Literal, Union
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field, PositiveFloat, PositiveInt
+from pydantic import Field, PositiveFloat
 
 from surgsim.catalog import PartConfig
 from surgsim.columns import Block
@@ -38,7 +38,7 @@ class PolicyConfig(PartConfig):
     action: Literal["tip_velocity", "joint_velocity"] = "tip_velocity"
     resolver: AnyOtherResolver = PinvConfig()
     tip_speed_max_m_per_s: PositiveFloat = 0.1
-    decimation: PositiveInt = 1
+    decimation: Annotated[int, Field(ge=1, le=100_000)] = 1
 
     def build(self, arm: ArmModel) -> "PolicyResolver":
         """The resolver.

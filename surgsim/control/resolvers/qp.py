@@ -17,7 +17,7 @@ from surgsim.control.problem import (
     braking_bounds,
     stacked_rows,
 )
-from surgsim.control.qp import DenseQp
+from surgsim.control.qp import SHIPPED, DenseQp
 from surgsim.errors import Outcome, unknown_name
 from surgsim.models.arm import ArmModel
 
@@ -30,12 +30,13 @@ def check_backend(name: str) -> str:
     Raises:
         ValueError: If there is not.
     """
-    if name == "daqp":
+    if name in SHIPPED:
         return name
     import qpsolvers  # half a second, and only the other back ends need it
 
-    if name not in qpsolvers.available_solvers:
-        raise ValueError(unknown_name(name, "QP solver installed here", qpsolvers.available_solvers))
+    known = sorted({*SHIPPED, *qpsolvers.available_solvers})
+    if name not in known:
+        raise ValueError(unknown_name(name, "QP solver installed here", known))
     return name
 
 
@@ -52,7 +53,7 @@ class QpConfig(PartConfig):
         acceleration_limit: Whether joint accelerations are limited too.
         planes: Virtual walls of the workspace.
         plane_gain_per_s: How fast the tip may approach a wall [1/s].
-        solver: `daqp` (native, warm) or another solver of qpsolvers by name.
+        solver: `daqp`, `osqp`, or another solver that qpsolvers finds installed, by its name.
     """
 
     type: Literal["qp"] = "qp"

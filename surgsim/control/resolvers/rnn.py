@@ -44,7 +44,7 @@ class RnnConfig(PartConfig):
     c1: NonNegativeFloat = 1.0
     c2: PositiveFloat = 0.01
     c3: NonNegativeFloat = 0.01
-    epsilon_s: PositiveFloat = 1e-3
+    epsilon_s: Annotated[float, Field(ge=1e-6)] = 1e-3
     k_tip: NonNegativeFloat = 5.0
     k_rcm: NonNegativeFloat = 5.0
     rcm: bool = True

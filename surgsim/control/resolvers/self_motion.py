@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field, NonNegativeFloat, NonNegativeInt
+from pydantic import Field, NonNegativeFloat
 
 from surgsim.catalog import PartConfig
 from surgsim.compiled import compiled
@@ -47,7 +47,7 @@ class SelfMotionConfig(PartConfig):
     k_tip: NonNegativeFloat = 5.0
     k_rcm: NonNegativeFloat = 5.0
     acceleration_share: Annotated[float, Field(gt=0.0, le=1.0)] = 0.9
-    search_starts: NonNegativeInt = 24
+    search_starts: Annotated[int, Field(ge=0, le=1000)] = 24
 
     def build(self, arm: ArmModel) -> "SelfMotionOptimum":
         """The resolver."""

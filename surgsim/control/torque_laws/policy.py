@@ -1,10 +1,10 @@
 """Policy: a callable that gives joint torques, in place of a torque law."""
 
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import PositiveInt
+from pydantic import Field
 
 from surgsim.catalog import PartConfig
 from surgsim.control.policies.asking import Asker, Held
@@ -27,7 +27,7 @@ class PolicyLawConfig(PartConfig):
     type: Literal["policy"] = "policy"
     name: str = "damping"
     add_bias: bool = True
-    decimation: PositiveInt = 1
+    decimation: Annotated[int, Field(ge=1, le=100_000)] = 1
 
     def build(self, arm: ArmModel) -> "PolicyLaw":
         """The law.

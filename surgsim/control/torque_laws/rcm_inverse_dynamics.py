@@ -4,7 +4,7 @@ from typing import Annotated, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field, NonNegativeFloat, NonNegativeInt, PositiveFloat
+from pydantic import Field, NonNegativeFloat, PositiveFloat
 
 from surgsim.catalog import PartConfig
 from surgsim.compiled import compiled
@@ -75,7 +75,7 @@ class RcmInverseDynamicsConfig(PartConfig):
     joint_stiffness_per_s2: NonNegativeFloat = 100.0
     joint_damping_ratio: NonNegativeFloat = 1.0
     observer_gain: Annotated[float, Field(ge=0.0, le=1.0)] = 0.3
-    most_delay_ticks: NonNegativeInt = 20
+    most_delay_ticks: Annotated[int, Field(ge=0, le=1000)] = 20
     full_gain_delay_s: PositiveFloat = 0.01
     sensor_delay_s: NonNegativeFloat = 0.0
     contact: Literal["reject", "yield"] = "reject"

@@ -67,6 +67,11 @@ class DisturbanceConfig(PartConfig):
             ValueError: With the reason.
         """
 
+    @property
+    def begins_s(self) -> float:
+        """When it first acts, since the start of the run [s]; one that begins after the end is refused."""
+        return 0.0
+
 
 class Disturbance(PlantPart):
     """A part of the plant that the controller's model does not know of."""

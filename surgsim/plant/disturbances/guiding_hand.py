@@ -13,6 +13,8 @@ from surgsim.plant.disturbances.base import Disturbance, DisturbanceConfig
 from surgsim.teleop.tremor import Tremor, TremorConfig
 
 Array = NDArray[np.float64]
+GRIP_S = 0.5
+"""Time over which the grip closes and opens [s]."""
 
 
 class GuidingHandConfig(DisturbanceConfig):
@@ -39,6 +41,11 @@ class GuidingHandConfig(DisturbanceConfig):
     force_max_n: Annotated[float, Field(gt=0.0, le=200.0)] = 20.0
     tremor: TremorConfig = TremorConfig()
 
+    @property
+    def begins_s(self) -> float:
+        """When it takes hold [s]."""
+        return max(0.0, self.start_s - GRIP_S)
+
     def build(self, rng: np.random.Generator) -> "GuidingHand":
         """The disturbance."""
         return GuidingHand(self)
@@ -48,10 +55,8 @@ class GuidingHand(Disturbance):
     """F = K (p_hand - p) + D (p_hand' - p') at the end of the adapter, at most force_max_n.
 
     p_hand = p_0 + s(t) travel + tremor, s(x) = 10 x^3 - 15 x^4 + 6 x^5 (minimum jerk; Flash and Hogan 1985).
-    The grip closes and opens over `_EDGE_S`.
+    The grip closes and opens over `GRIP_S`.
     """
-
-    _EDGE_S = 0.5
 
     def __init__(self, config: GuidingHandConfig) -> None:
         self._c = config
@@ -85,8 +90,8 @@ class GuidingHand(Disturbance):
 
     def grip_at(self, t_s: float) -> float:
         """How closed the hand is, from 0 to 1."""
-        closed = (t_s - self._c.start_s) / self._EDGE_S + 1.0
-        opened = (self._c.start_s + self._c.duration_s + self._c.stay_s - t_s) / self._EDGE_S + 1.0
+        closed = (t_s - self._c.start_s) / GRIP_S + 1.0
+        opened = (self._c.start_s + self._c.duration_s + self._c.stay_s - t_s) / GRIP_S + 1.0
         return float(min(max(min(closed, opened), 0.0), 1.0))
 
     def _progress(self, t_s: float) -> tuple[float, float]:

@@ -39,6 +39,11 @@ class PushConfig(DisturbanceConfig):
 
     direction: Direction = "given"
 
+    @property
+    def begins_s(self) -> float:
+        """When it first acts [s]."""
+        return self.start_s
+
     def build(self, rng: np.random.Generator) -> "Push":
         """The disturbance, its direction drawn."""
         return Push(self, pointed(rng, np.array(self.force_n), self.direction))

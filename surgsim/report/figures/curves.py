@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surgsim.report.figures.scale import Scale
-from surgsim.report.figures.svg import WIDTH, Drawing, colour, cross, dash, fmt, mark, polyline
+from surgsim.report.figures.svg import WIDTH, Drawing, colour, cross, dash, fmt, margin, mark, polyline
 
 Array = NDArray[np.float64]
-_LEFT, _TOP, _BOTTOM = 46.0, 22.0, 186.0
+_TOP, _BOTTOM = 22.0, 186.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -42,12 +42,13 @@ def curve_plot(
 ) -> str:
     """All `curves` in one frame; `unit_y`: ordinates are shares from 0 to 1."""
     drawing = Drawing(_BOTTOM + 36)
-    x = Scale.over(np.concatenate([c.x for c in curves]).tolist(), _LEFT, WIDTH - 10, log=log_x)
+    y = Scale.over([0.0, 1.0] if unit_y else _heights(curves), _BOTTOM, _TOP, log=False if unit_y else None)
+    left = margin(y)
+    x = Scale.over(np.concatenate([c.x for c in curves]).tolist(), left, WIDTH - 10, log=log_x)
     if not log_x:
         x = Scale(low=float(min(c.x[0] for c in curves)), high=x.high, start=x.start, end=x.end)
-    y = Scale.over([0.0, 1.0] if unit_y else _heights(curves), _BOTTOM, _TOP, log=False if unit_y else None)
-    drawing.x_axis(x, _TOP, _BOTTOM, x_label + (", log scale" if log_x else ""))
-    drawing.y_axis(y, _LEFT, WIDTH - 10, y_label + (", log scale" if y.log else ""))
+    drawing.x_axis(x, _TOP, _BOTTOM, x_label + (", log scale" if x.log else ""))
+    drawing.y_axis(y, left, WIDTH - 10, y_label + (", log scale" if y.log else ""))
     for curve in curves:
         if curve.low is not None and curve.high is not None:
             there = _points(x, y, curve, curve.low)
@@ -64,11 +65,10 @@ def curve_plot(
 
 
 def _heights(curves: Sequence[Curve]) -> list[float]:
-    """Every ordinate above zero, for a logarithmic axis; all of them if none is."""
+    """Every ordinate that is drawn."""
     parts = [part for c in curves for part in (c.middle, c.low, c.high, *c.ended) if part is not None]
     values = np.concatenate(parts)
-    values = values[np.isfinite(values)]
-    return [float(x) for x in (values[values > 0.0] if (values > 0.0).any() else values)] or [0.0, 1.0]
+    return [float(x) for x in values[np.isfinite(values)]] or [0.0, 1.0]
 
 
 def _points(x: Scale, y: Scale, curve: Curve, values: Array) -> list[tuple[float, float]]:

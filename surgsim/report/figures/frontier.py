@@ -7,10 +7,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surgsim.report.figures.scale import Scale
-from surgsim.report.figures.svg import WIDTH, Drawing, colour, cross, dash, fmt, mark, polyline
+from surgsim.report.figures.svg import WIDTH, Drawing, colour, cross, dash, fmt, margin, mark, polyline
 
 Array = NDArray[np.float64]
-_LEFT, _STRIP, _ROW, _PLOT = 46.0, 24.0, 13.0, 150.0
+_STRIP, _ROW, _PLOT = 24.0, 13.0, 150.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -43,14 +43,15 @@ def frontier_plot(tracks: Sequence[Track], x_label: str, y_label: str) -> str:
     bottom = top + _PLOT
     drawing = Drawing(bottom + 36)
     values = np.concatenate([part for t in tracks for part in (t.middle, t.low, t.high)])
-    x = Scale.over(np.concatenate([t.x for t in tracks]).tolist(), _LEFT + 16, WIDTH - 34)
     y = Scale.over(values.tolist(), bottom, top)
+    left = margin(y)
+    x = Scale.over(np.concatenate([t.x for t in tracks]).tolist(), left + 16, WIDTH - 34)
     drawing.x_axis(x, _STRIP, bottom, x_label + (", log scale" if x.log else ""))
-    drawing.y_axis(y, _LEFT, WIDTH - 10, y_label + (", log scale" if y.log else ""))
+    drawing.y_axis(y, left, WIDTH - 10, y_label + (", log scale" if y.log else ""))
     for row, track in enumerate(failing):
         _crosses(drawing, x, track, _STRIP + _ROW * row)
     if failing:
-        drawing.text(_LEFT - 5, _STRIP + 4 + _ROW * (len(failing) - 1) / 2, "failed", "tick", "end")
+        drawing.text(left - 5, _STRIP + 4 + _ROW * (len(failing) - 1) / 2, "failed", "tick", "end")
     for k, track in enumerate(tracks):
         _track(drawing, x, y, track, 3.0 * (k - (len(tracks) - 1) / 2))
     return drawing.render(f"{y_label} against {x_label}, {len(tracks)} controllers.")

@@ -8,7 +8,8 @@ from numpy.typing import NDArray
 
 from surgsim.compare.wording import number
 from surgsim.report.figures.scale import Scale
-from surgsim.report.figures.svg import WIDTH, Drawing, cross, fmt, tick_text
+from surgsim.report.figures.svg import WIDTH, Drawing, cross, fmt
+from surgsim.report.figures.ticks import tick_text
 
 Array = NDArray[np.float64]
 _LEFT, _TOP, _ROW = 46.0, 24.0, 34.0

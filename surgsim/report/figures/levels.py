@@ -7,10 +7,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surgsim.report.figures.scale import Scale
-from surgsim.report.figures.svg import WIDTH, Drawing, colour, cross, dash, fmt, mark, polyline
+from surgsim.report.figures.svg import WIDTH, Drawing, colour, cross, dash, fmt, margin, mark, polyline
 
 Array = NDArray[np.float64]
-_LEFT, _STRIP, _ROW, _PLOT = 46.0, 28.0, 13.0, 140.0
+_STRIP, _ROW, _PLOT = 28.0, 13.0, 140.0
 _SHIFT = 4.0
 
 
@@ -42,10 +42,13 @@ def levels_plot(tracks: Sequence[LevelTrack], levels: Sequence[str], x_label: st
     values = np.concatenate([part for t in tracks for part in (t.low, t.high)])
     positive = bool((values[np.isfinite(values)] > 0.0).all())
     y = Scale.over(values.tolist(), bottom, top, log=True if positive else None)
-    columns = [_LEFT + (WIDTH - 10 - _LEFT) * (k + 0.5) / len(levels) for k in range(len(levels))]
+    left = margin(y)
+    columns = [left + (WIDTH - 10 - left) * (k + 0.5) / len(levels) for k in range(len(levels))]
     _axes(drawing, y, columns, levels, (x_label, y_label + (", log scale" if y.log else "")))
     for row, track in enumerate(failing):
-        _crosses(drawing, columns, track, _STRIP + _ROW * (row + 0.5))
+        y_row = _STRIP + _ROW * (row + 0.5)
+        drawing.path(mark(track.index, left - 8, y_row, 3.5), f"fill {colour(track.index)}")
+        _crosses(drawing, columns, track, y_row)
     for k, track in enumerate(tracks):
         _track(drawing, [x + _SHIFT * (k - (len(tracks) - 1) / 2) for x in columns], y, track)
     return drawing.render(f"{y_label} against {x_label}, {len(tracks)} controllers, {len(failing)} fail.")
@@ -54,15 +57,15 @@ def levels_plot(tracks: Sequence[LevelTrack], levels: Sequence[str], x_label: st
 def _axes(
     drawing: Drawing, y: Scale, columns: Sequence[float], levels: Sequence[str], labels: tuple[str, str]
 ) -> None:
-    drawing.y_axis(y, _LEFT, WIDTH - 10, labels[1])
-    drawing.path(f"M{fmt(_LEFT)} {fmt(y.start)}H{fmt(WIDTH - 10)}", "axis")
+    left = margin(y)
+    drawing.y_axis(y, left, WIDTH - 10, labels[1])
+    drawing.path(f"M{fmt(left)} {fmt(y.start)}H{fmt(WIDTH - 10)}", "axis")
     for x, level in zip(columns, levels, strict=True):
         drawing.text(x, y.start + 14, level, "tick", "middle")
-    drawing.text((_LEFT + WIDTH - 10) / 2, y.start + 30, labels[0], "label", "middle")
+    drawing.text((left + WIDTH - 10) / 2, y.start + 30, labels[0], "label", "middle")
 
 
 def _crosses(drawing: Drawing, columns: Sequence[float], track: LevelTrack, y: float) -> None:
-    drawing.path(mark(track.index, _LEFT - 8, y, 3.5), f"fill {colour(track.index)}")
     for x, failure in zip(columns, track.failures, strict=True):
         if failure:
             drawing.path(cross(x - 14, y, 3.5), f"line {colour(track.index)}")

@@ -6,6 +6,8 @@ from collections.abc import Iterable
 from surgsim.report.figures.scale import Scale
 
 WIDTH = 360.0
+CHARACTER = 6.4
+"""Width of a character of a tick."""
 _MARKS = (
     "m-{r} 0a{r} {r} 0 1 0 {d} 0a{r} {r} 0 1 0 -{d} 0z",  # circle
     "m-{r} -{r}h{d}v{d}h-{d}z",  # square
@@ -22,14 +24,9 @@ def fmt(value: float) -> str:
     return f"{value:.1f}".removesuffix(".0")
 
 
-def tick_text(value: float) -> str:
-    """A tick's value in as few characters as it takes."""
-    if value != 0.0 and not 1e-3 <= abs(value) < 1e5:
-        mantissa, exponent = f"{value:.4e}".split("e")
-        text = f"{float(mantissa):g}e{int(exponent)}"
-    else:
-        text = f"{value:.8g}"
-    return text.replace("-", "−")
+def margin(scale: Scale, least: float = 46.0) -> float:
+    """Room that the labels of a vertical axis take on its left."""
+    return max(least, 10.0 + CHARACTER * max((len(text) for _, text in scale.labels()), default=0))
 
 
 def shortened(name: str, most: int = 30) -> str:
@@ -84,20 +81,18 @@ class Drawing:
 
     def x_axis(self, scale: Scale, top: float, bottom: float, label: str = "") -> None:
         """Add grid lines, ticks and the label of a horizontal axis at `bottom`."""
-        for tick in scale.ticks():
-            x = scale.at(tick)
+        for x, text in scale.labels():
             self.path(f"M{fmt(x)} {fmt(top)}V{fmt(bottom)}", "grid")
-            half = 3.2 * len(tick_text(tick))  # kept inside the drawing
-            self.text(min(max(x, half), self.width - half), bottom + 14, tick_text(tick), "tick", "middle")
+            half = 0.5 * CHARACTER * len(text)  # kept inside the drawing
+            self.text(min(max(x, half), self.width - half), bottom + 14, text, "tick", "middle")
         self.path(f"M{fmt(scale.start)} {fmt(bottom)}H{fmt(scale.end)}", "axis")
         self.text((scale.start + scale.end) / 2, bottom + 30, label, "label", "middle")
 
     def y_axis(self, scale: Scale, left: float, right: float, label: str = "") -> None:
         """Add grid lines, ticks and the label (above) of a vertical axis at `left`."""
-        for tick in scale.ticks():
-            y = scale.at(tick)
+        for y, text in scale.labels():
             self.path(f"M{fmt(left)} {fmt(y)}H{fmt(right)}", "grid")
-            self.text(left - 5, y + 4, tick_text(tick), "tick", "end")
+            self.text(left - 5, y + 4, text, "tick", "end")
         self.path(f"M{fmt(left)} {fmt(scale.start)}V{fmt(scale.end)}", "axis")
         self.text(2, 12, label, "label")
 

@@ -53,7 +53,7 @@ def _frontiers(runs: Observations, results: Results, controllers: Sequence[str],
         ]
         if any(np.isfinite(track.middle).any() for track in tracks):
             drawing = frontier_plot(tracks, key, metric_label(metric))
-            figures.append(html.figure(drawing, metric, "median and 10–90 % of completed runs"))
+            figures.append(html.figure(drawing, metric_label(metric), "median and 10–90 % of completed runs"))
     held = f", with {fixed}" if fixed else ""
     text = f"Against {key}{held}. Crosses: failed runs of all at that point."
     return html.paragraph(text) + html.figures(*figures)

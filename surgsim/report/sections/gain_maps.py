@@ -9,7 +9,7 @@ from surgsim.compare.observations import Observations
 from surgsim.report import html
 from surgsim.report.axes import Axis, axes_of
 from surgsim.report.figures.heat import HeatMap, heat_map, shades_of
-from surgsim.report.figures.svg import tick_text
+from surgsim.report.figures.ticks import tick_text
 from surgsim.report.results import Results, parameters_of
 from surgsim.report.sections.leaderboard import metric_label
 
@@ -30,7 +30,7 @@ def maps_section(results: Results) -> str:
     parts = []
     for name, metric in itertools.product(results.runs.scenarios, _METRICS):
         if metric in results.metrics:
-            title = f"{metric}, {name}" if several else metric
+            title = f"{metric_label(metric)}, {name}" if several else metric_label(metric)
             drawn = _maps(results.runs.of_scenario(name), results.runs.controllers, (x, y), others, metric)
             parts.append(f"<h3>{html.escape(title)}</h3>{drawn}")
     return html.section("frontier", "Frontier", html.paragraph(note), *parts)

@@ -6,7 +6,9 @@ from string import Template
 from typing import Any
 
 from surgsim.compare.intervals import FEWEST, RESAMPLES
+from surgsim.compare.wording import exactly, heading_of
 from surgsim.metrics.catalog import METRICS
+from surgsim.metrics.metric import Metric
 from surgsim.report import html
 from surgsim.report.results import Results
 
@@ -15,19 +17,33 @@ def methods_section(results: Results) -> str:
     """Methods in words, and the meaning of every metric."""
     template = Template(Path(__file__).with_name("methods.html").read_text(encoding="utf-8"))
     words = template.substitute(resamples=RESAMPLES, fewest=FEWEST)
-    better = {True: "less", False: "more", None: "neither"}
-    rows = [
-        [
-            f'<th scope="row">{name}</th>',
-            html.escape(METRICS[name].meaning),
-            better[METRICS[name].lower_is_better],
-        ]
-        for name in results.metrics
-    ]
+    rows = [_metric(results, METRICS[name]) for name in results.metrics]
     missing = [name for name in METRICS if name not in results.metrics]
     text = f"Not defined in any completed run: {', '.join(missing)}." if missing else ""
-    metrics = html.table("Metrics", ["metric", "meaning", "better"], rows, "wide")
-    return html.section("methods", "Methods", words, "<h3>Metrics</h3>", metrics, html.paragraph(text))
+    head = ["metric", "meaning", "better", "smallest difference that matters"]
+    metrics = html.table("Metrics", head, rows, "wide")
+    return html.section(
+        "methods",
+        "Methods",
+        html.details("How the figures are made", words, printed=True),
+        html.details(
+            "What the metrics mean, and which differences matter", metrics, html.paragraph(text), printed=True
+        ),
+    )
+
+
+def _metric(results: Results, metric: Metric) -> list[str]:
+    """A row of the table of metrics."""
+    matters, unit = results.runs.matters(metric.name), heading_of(metric)[1]
+    source = metric.matters_source if matters == metric.matters else "set for this batch"
+    least = f"{html.escape(exactly(matters, unit))}<small>{html.escape(source)}</small>" if matters else "any"
+    name = f"<small><code>{html.breakable(metric.name)}</code></small>"
+    return [
+        f'<th scope="row">{html.escape(metric.heading)}{name}</th>',
+        html.escape(metric.meaning),
+        {True: "less", False: "more", None: "neither"}[metric.lower_is_better],
+        least,
+    ]
 
 
 def versions_section(results: Results) -> str:
@@ -45,6 +61,6 @@ def versions_section(results: Results) -> str:
     shown = "".join(
         f"<dt>{html.escape(name)}</dt><dd>{html.escape(value)}</dd>" for name, value in facts if value
     )
-    mixed = len({(row["surgsim_version"], row["commit"]) for row in results.rows}) > 1
-    warning = html.paragraph("Runs of several versions are mixed.", "warning") if mixed else ""
+    mixed = len({row["code_sha256"] for row in results.rows}) > 1
+    warning = html.paragraph("Runs of several versions of the code are mixed.", "warning") if mixed else ""
     return html.section("versions", "Versions", warning, f"<dl>{shown}</dl>")

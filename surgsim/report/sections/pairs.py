@@ -1,44 +1,60 @@
-"""Every controller against every other, in words."""
+"""Controllers against each other, in words: the first against every other, all pairs folded below."""
+
+from collections.abc import Sequence
 
 from surgsim.compare.intervals import Interval
-from surgsim.compare.statistics import Comparison, Verdict, compare_all
-from surgsim.compare.wording import bracket, counted, number, unit_of
+from surgsim.compare.statistics import Comparison, compare_all, compare_pair
+from surgsim.compare.verdict import Verdict
+from surgsim.compare.wording import bracket, counted, exactly, heading_of, number, seeds_of
+from surgsim.metrics.catalog import METRICS
 from surgsim.report import html
 from surgsim.report.results import Results
+from surgsim.report.sections.leaderboard import Boards
 
 _MOST_CONTROLLERS = 12
 
 
-def pairs_section(results: Results) -> str:
-    """Comparisons over all scenarios, one table for each headline metric."""
-    if len(results.runs.controllers) < 2 or not results.metrics:
+def pairs_section(results: Results, boards: Boards) -> str:
+    """Comparisons over all scenarios: of the first controller, then of all, a table for each main metric."""
+    if len(results.runs.controllers) < 2 or not boards:
         return ""
     note = (
         "Runs are paired by scenario, grid point and seed; a pair counts where both completed. Scenarios "
-        "weigh the same. The probability that A is better counts failures as losses. Each interval is 95 % "
-        "by itself: of twenty comparisons without a difference one is expected to show one."
+        "weigh the same. The probability that A is better counts failures as losses, and differences below "
+        "what matters as half. Each interval is 95 % by itself: of twenty comparisons without a difference "
+        "one is expected to show one."
     )
-    tables = []
-    for k, metric in enumerate(results.headline):
-        whole = comparison_table(results, metric)
-        title = f"{metric}, all scenarios"
-        tables.append(f"<h3>{html.escape(title)}</h3>{whole}" if k == 0 else html.details(title, whole))
-    return html.section("pairs", "In pairs", html.paragraph(note), *tables)
+    main = results.headline[0]
+    first, *others = boards[main]
+    against = [compare_pair(results.runs, first, other, main) for other in others[: _MOST_CONTROLLERS - 1]]
+    folded = [
+        html.details(
+            f"Every pair by {METRICS[metric].heading}",
+            comparison_table(results, metric),
+            printed=metric == main,
+        )
+        for metric in results.headline
+    ]
+    title = f"<h3>{html.escape(first)} against each, by {html.escape(METRICS[main].heading)}</h3>"
+    return html.section(
+        "pairs", "In pairs", html.paragraph(note), title, _table(results, main, against), *folded
+    )
 
 
 def comparison_table(results: Results, metric: str, scenario: str | None = None) -> str:
     """Comparisons by one metric; of many controllers only the first ones."""
-    found = compare_all(results.runs, metric, scenario, most=_MOST_CONTROLLERS)
-    head = ["A against B", "finding", f"A − B{_unit(metric)}", "P(A better)", "pairs", "left out"]
+    table = _table(results, metric, compare_all(results.runs, metric, scenario, most=_MOST_CONTROLLERS))
     cut = len(results.runs.controllers) > _MOST_CONTROLLERS
-    note = f"The first {_MOST_CONTROLLERS} controllers only." if cut else ""
-    table = html.table(f"Pairs by {metric}", head, [_row(comparison) for comparison in found], "pairs")
-    return table + (html.paragraph(note) if note else "")
+    return table + (html.paragraph(f"The first {_MOST_CONTROLLERS} controllers only.") if cut else "")
 
 
-def _unit(metric: str) -> str:
-    unit = unit_of(metric)
-    return f" [{unit}]" if unit else ""
+def _table(results: Results, metric: str, found: Sequence[Comparison]) -> str:
+    unit = heading_of(METRICS[metric])[1]
+    matters = results.runs.matters(metric)
+    least = f"<small>{html.escape(exactly(matters, unit))} or more matters</small>" if matters else ""
+    difference = f"A − B [{html.escape(unit)}]" if unit else "A − B"
+    head = ["A against B", "finding", f"{difference}{least}", "P(A better)", "pairs", "left out"]
+    return html.table(f"Pairs by {METRICS[metric].heading}", head, [_row(one) for one in found], "pairs")
 
 
 def _row(found: Comparison) -> list[str]:
@@ -49,7 +65,7 @@ def _row(found: Comparison) -> list[str]:
         f'<td class="{kind}">{html.escape(found.sentence)}</td>',
         _figure(found.difference),
         _figure(found.improvement),
-        f"{found.pairs}<small>{found.difference.n} seeds</small>",
+        f"{found.pairs}<small>{html.escape(seeds_of(found.seeds))}</small>",
         f"{sum(found.left_out.values())}<small>{html.escape(left)}</small>" if left else "0",
     ]
 

@@ -3,14 +3,14 @@
 import numpy as np
 
 from surgsim.compare.aggregates import performance_profile, scores
+from surgsim.metrics.catalog import METRICS
 from surgsim.report import html
 from surgsim.report.figures.curves import Curve, curve_plot
 from surgsim.report.figures.intervals import interval_plot
 from surgsim.report.results import Results
 from surgsim.report.sections.leaderboard import Boards
 
-_TAUS = 60
-_FURTHEST = 1e4
+_TAUS = 80
 
 
 def ranking_section(results: Results, boards: Boards) -> str:
@@ -18,13 +18,21 @@ def ranking_section(results: Results, boards: Boards) -> str:
     if not boards:
         return ""
     names = results.runs.controllers
-    parts = [_of_metric(results, boards, metric) for metric in results.headline]
+    main, *rest = results.headline
     note = (
         "A score of 1 is the typical run of the setting's best controller (a setting is a scenario and a "
         "grid point); a score of 10 is ten times worse. The profile is the share of all runs that score at "
-        "most τ: a controller that fails never reaches the top."
+        "most τ: a controller that completed all its runs reaches the top, one that fails never does."
     )
-    return html.section("ranking", "Rank over scenarios", html.paragraph(note), html.legend(names), *parts)
+    folded = [
+        html.details(f"The same by {METRICS[metric].heading}", _of_metric(results, boards, metric))
+        for metric in rest
+    ]
+    title = f"<h3>{html.escape(METRICS[main].heading)}</h3>"
+    drawn = _of_metric(results, boards, main)
+    return html.section(
+        "ranking", "Rank over scenarios", html.paragraph(note), html.legend(names), title, drawn, *folded
+    )
 
 
 def _of_metric(results: Results, boards: Boards, metric: str) -> str:
@@ -33,8 +41,8 @@ def _of_metric(results: Results, boards: Boards, metric: str) -> str:
     ranked = sorted(rows, key=lambda row: row[2].rank.value if row[2].rank.value is not None else np.inf)
     rank = interval_plot([(name, i, row.rank) for name, i, row in ranked], "mean rank, 1 is best")
     score = interval_plot([(name, i, row.score) for name, i, row in ranked], "normalised score, 1 is best")
-    return f"<h3>{html.escape(metric)}</h3>" + html.figures(
-        html.figure(rank, "Mean rank", "over scenarios, failures last"),
+    return html.figures(
+        html.figure(rank, "Mean rank", "over scenarios, failures last; ties share it"),
         html.figure(score, "Interquartile mean of scores", f"completed runs only{_failures(boards, metric)}"),
         html.figure(_profile(results, metric), "Performance profile", "share of all runs, 95 % bands"),
     )
@@ -50,8 +58,8 @@ def _profile(results: Results, metric: str) -> str:
     score = scores(runs, metric)
     finite = score[np.isfinite(score) & (score > 0.0)]
     low = min(float(finite.min()), 1.0) if finite.size else 1.0
-    high = min(max(float(finite.max()), 2.0), _FURTHEST) if finite.size else 2.0
-    taus = np.geomspace(low, high * 1.05, _TAUS)
+    high = max(float(finite.max()), 2.0) if finite.size else 2.0
+    taus = np.geomspace(low, high * 1.05, _TAUS)  # to the worst score: who completed all reaches the top
     curves = []
     for index, name in enumerate(runs.controllers):
         mine = np.asarray(runs.controller == name, dtype=bool)

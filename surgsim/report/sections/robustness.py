@@ -4,12 +4,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from surgsim.compare.failures import WORST_RCM_MM
 from surgsim.compare.observations import Observations
 from surgsim.report import html
 from surgsim.report.axes import Axis, sweeps_of
-from surgsim.report.failing import WORST_RCM_MM, AtLevel, along, at_level
+from surgsim.report.failing import AtLevel, along, at_level
 from surgsim.report.figures.levels import LevelTrack, levels_plot
-from surgsim.report.figures.svg import tick_text
+from surgsim.report.figures.ticks import tick_text
 from surgsim.report.results import Results
 from surgsim.report.sections.leaderboard import metric_label
 
@@ -41,7 +42,7 @@ def _scenario(runs: Observations, results: Results, sweeps: Sequence[Axis]) -> s
     parts = [_table(runs, results.runs.controllers, sweeps)]
     for metric in (name for name in _METRICS if name in results.metrics):
         panels = [_panel(runs, results.runs.controllers, sweep, sweeps, metric) for sweep in sweeps]
-        parts += [f"<h4>{html.escape(metric)}</h4>", html.figures(*panels)]
+        parts.append(html.details(f"{metric_label(metric)} over the levels", html.figures(*panels)))
     return "".join(parts)
 
 

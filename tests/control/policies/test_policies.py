@@ -17,6 +17,7 @@ from surgsim.control.resolvers.pinv import Pinv, PinvConfig
 from surgsim.control.resolvers.policy import PolicyConfig
 from surgsim.control.torque_laws.policy import PolicyLawConfig
 from surgsim.errors import Outcome, SurgsimError
+from surgsim.plugins import Offer
 from surgsim.simulate.loop import simulate
 
 
@@ -63,19 +64,25 @@ def test_an_unknown_name_is_refused_with_the_known_ones_and_a_way_out():
 
 
 def test_policies_of_other_packages_come_from_entry_points_and_cannot_hide_ours(monkeypatch):
-    points = [
-        SimpleNamespace(name="theirs", value="their_policy:act"),
-        SimpleNamespace(name="absent", value="their_policy:nothing"),
-        SimpleNamespace(name="number", value="math:pi"),
-        SimpleNamespace(name="damping", value="math:sin"),
-    ]
-    monkeypatch.setattr(registry, "entry_points", lambda group: points if group == "surgsim.policies" else [])
+    places = {
+        "theirs": "their_policy:act",
+        "absent": "their_policy:nothing",
+        "number": "math:pi",
+        "damping": "math:sin",
+    }
+    given = {
+        name: Offer(group=registry.GROUP, name=name, place=place, package="lab", version="1.0")
+        for name, place in places.items()
+    }
+    monkeypatch.setattr(registry, "offers", lambda group: given)
     monkeypatch.setitem(sys.modules, "their_policy", SimpleNamespace(act=np.negative))
     assert find_policy("theirs") is np.negative
     assert find_policy("damping") is damping
-    with pytest.raises(SurgsimError, match="policy 'absent' does not load"):
+    with pytest.raises(SurgsimError, match=r"policy 'absent' of the package lab 1\.0 does not load"):
         find_policy("absent")
-    with pytest.raises(SurgsimError, match=r"policy 'number' \(math:pi\) cannot be called"):
+    with pytest.raises(
+        SurgsimError, match=r"policy 'number' of the package lab 1\.0 \(math:pi\) cannot be called"
+    ):
         find_policy("number")
 
 

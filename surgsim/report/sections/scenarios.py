@@ -1,11 +1,11 @@
-"""A scenario: box plots, errors over time, manipulability, robustness, comparisons."""
+"""Scenarios: a table of all, and of each box plots, errors over time, manipulability, comparisons."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from surgsim.compare.observations import Observations
-from surgsim.compare.wording import number
+from surgsim.compare.wording import number, plural
 from surgsim.metrics.catalog import METRICS
 from surgsim.report import html
 from surgsim.report.figures.boxes import MOST_POINTS, Group, box_plot
@@ -17,31 +17,71 @@ from surgsim.report.sections.pairs import comparison_table
 from surgsim.report.series import COLUMNS, Series
 
 
-def scenario_section(results: Results, name: str, index: int, series: Series | None) -> str:
+def scenarios_section(results: Results, series: Mapping[str, Series]) -> str:
+    """A table of the main metric over scenarios, and everything about each one, folded."""
+    names = results.runs.scenarios
+    folded = [
+        html.details(
+            name,
+            _scenario(results, name, series.get(name)),
+            small=_facts(results.runs.of_scenario(name)),
+            anchor=f"scenario-{index}",
+        )
+        for index, name in enumerate(names)
+    ]
+    return html.section("scenarios", "Scenario by scenario", _overview(results), *folded)
+
+
+def _overview(results: Results) -> str:
+    """Medians of the main metric, a row for each scenario, and how many runs failed."""
+    if not results.metrics:
+        return ""
+    main, runs = results.headline[0], results.runs
+    head = ["scenario", *(html.swatch(k) + html.breakable(c) for k, c in enumerate(runs.controllers))]
+    rows = []
+    for name in runs.scenarios:
+        mine = [runs.of_scenario(name).of_controller(controller) for controller in runs.controllers]
+        rows.append([f'<th scope="row">{html.breakable(name)}</th>', *(_median(one, main) for one in mine)])
+    note = html.paragraph(
+        f"Medians of {METRICS[main].heading} over completed runs; unfold one for its figures."
+    )
+    return note + html.table("Scenarios", head, rows, "fails")
+
+
+def _median(runs: Observations, metric: str) -> str:
+    values = runs.values(metric)
+    failed = len(runs) - int(runs.completed.sum())
+    text = number(float(np.nanmedian(values))) if np.isfinite(values).any() else "–"
+    lost = f"<small>{failed} of {len(runs)} failed</small>" if failed else ""
+    return f'<td class="{"bad" if failed else ""}">{text}{lost}</td>'
+
+
+def _scenario(results: Results, name: str, series: Series | None) -> str:
     """Everything about one scenario."""
     runs = results.runs.of_scenario(name)
     controllers = results.runs.controllers
     dexterity = [metric for metric in results.shown if metric.startswith("manipulability")]
     errors = [metric for metric in results.shown if metric not in dexterity]
     rest = [metric for metric in results.metrics if metric not in results.shown]
-    return html.section(
-        f"scenario-{index}",
-        name,
-        html.paragraph(_facts(runs)),
-        html.legend(controllers),
-        "<h3>Errors and forces</h3>",
-        html.figures(*(_boxes(runs, controllers, metric) for metric in errors)),
-        "<h3>Over time</h3>" + _over_time(series, controllers, ("rcm_error_m", "tip_error_m")),
-        "<h3>Manipulability</h3>" if dexterity else "",
-        html.figures(
-            *(_boxes(runs, controllers, metric) for metric in dexterity),
-            *_bands(series, controllers, ("manipulability",)),
-        ),
-        frontiers(runs, results, controllers),
-        _compared(results, name),
-        html.details("More metrics", html.figures(*(_boxes(runs, controllers, m) for m in rest)))
-        if rest
-        else "",
+    pooled = len(set(runs.parameters.tolist())) > 1
+    return "".join(
+        (
+            html.legend(controllers),
+            html.paragraph("Box plots pool the grid points.") if pooled else "",
+            "<h3>Errors and forces</h3>",
+            html.figures(*(_boxes(runs, controllers, metric) for metric in errors)),
+            "<h3>Over time</h3>" + _over_time(series, controllers, ("rcm_error_m", "tip_error_m")),
+            "<h3>Manipulability</h3>" if dexterity else "",
+            html.figures(
+                *(_boxes(runs, controllers, metric) for metric in dexterity),
+                *_bands(series, controllers, ("manipulability",)),
+            ),
+            frontiers(runs, results, controllers),
+            _compared(results, name),
+            html.details("More metrics", html.figures(*(_boxes(runs, controllers, m) for m in rest)))
+            if rest
+            else "",
+        )
     )
 
 
@@ -49,10 +89,9 @@ def _facts(runs: Observations) -> str:
     done, seeds = int(runs.completed.sum()), len(set(runs.seed.tolist()))
     points = len(set(runs.parameters.tolist()))
     grid = f" × {points} grid points" if points > 1 else ""
-    pooled = " Box plots pool the grid points." if points > 1 else ""
     return (
-        f"{len(runs)} runs: {len(runs.controllers)} controllers × {seeds} seeds{grid}; {done} completed, "
-        f"{len(runs) - done} failed.{pooled}"
+        f"{plural(len(runs), 'run')}: {plural(len(runs.controllers), 'controller')} × "
+        f"{plural(seeds, 'seed')}{grid}; {done} completed, {len(runs) - done} failed"
     )
 
 
@@ -69,7 +108,7 @@ def _boxes(runs: Observations, controllers: Sequence[str], metric: str) -> str:
         return ""
     many = any(group.values.size > MOST_POINTS for group in groups)
     note = METRICS[metric].meaning + (f"; {MOST_POINTS} points of each drawn" if many else "")
-    return html.figure(box_plot(groups, metric_label(metric)), metric, note)
+    return html.figure(box_plot(groups, metric_label(metric)), metric_label(metric), note)
 
 
 def _over_time(series: Series | None, controllers: Sequence[str], columns: Sequence[str]) -> str:
@@ -128,7 +167,7 @@ def _compared(results: Results, name: str) -> str:
     if len(results.runs.controllers) < 2:
         return ""
     tables = [
-        f"<h4>{html.escape(metric)}</h4>{comparison_table(results, metric, name)}"
+        f"<h4>{html.escape(metric_label(metric))}</h4>{comparison_table(results, metric, name)}"
         for metric in results.headline
     ]
     return html.details("Controllers in pairs, in this scenario", *tables)

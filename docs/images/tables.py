@@ -1,0 +1,173 @@
+"""Writes the tables of the documents that come from `results/leaderboard`, between their marks in the pages.
+
+A table stands in a page between `<!-- table NAME -->` and `<!-- end -->`. `tests/test_made.py` holds pages
+against the results.
+"""
+
+import re
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow.parquet as pq
+
+ROOT = Path(__file__).resolve().parents[2]
+RESULTS = ROOT / "results" / "leaderboard"
+PAGES = ("README.md", "docs/robustness.md", "docs/peg_and_ring.md", "results/leaderboard/README.md")
+_MARKED = r"(<!-- table (\w+) -->\n\n).*?(\n<!-- end -->)"
+_ARMS = {"lwr4plus": "LWR4+", "panda": "Panda"}
+
+Rows = Sequence[Mapping[str, Any]]
+Statistic = Callable[[Sequence[float]], float]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Column:
+    """A column of figures.
+
+    Attributes:
+        heading: What the page calls it.
+        metric: The metric.
+        of: What is taken of the runs' values.
+    """
+
+    heading: str
+    metric: str
+    of: Statistic = np.mean
+
+
+def rows_of(suite: str, scenario: str = "") -> Rows:
+    """Runs of a suite, of one scenario if named."""
+    rows = pq.read_table(RESULTS / suite / "runs.parquet", partitioning=None).to_pylist()
+    return [row for row in rows if scenario in ("", row["scenario"])]
+
+
+def table(head: Sequence[str], lines: Sequence[Sequence[str]]) -> str:
+    """A table in Markdown."""
+    cells = [head, ["---"] * len(head), *lines]
+    return (
+        "".join("| " + " | ".join(line) + " |\n" for line in cells)
+        .replace("| --- ", "|---")
+        .replace("|--- |", "|---|")
+    )
+
+
+def figure(rows: Rows, column: Column) -> str:
+    """A cell: the figure over completed runs, with a note of those that failed."""
+    done = [row for row in rows if row["outcome"] == "completed"]
+    if not done:
+        return f"{len(rows)} of {len(rows)} failed"
+    lost = f" ({len(rows) - len(done)} of {len(rows)} failed)" if len(done) < len(rows) else ""
+    return f"{float(column.of([row[column.metric] for row in done])):.3g}{lost}"
+
+
+def by_controller(suite: str, columns: Mapping[str, Sequence[Column]], key: tuple[str, str]) -> str:
+    """A row for each controller, best first by metric `key[1]` of scenario `key[0]`; columns by scenario."""
+    names = dict.fromkeys(row["controller"] for row in rows_of(suite))
+    rows = {
+        (scenario, name): [row for row in rows_of(suite, scenario) if row["controller"] == name]
+        for scenario in columns
+        for name in names
+    }
+    order = sorted(
+        names, key=lambda name: (float(np.mean([row[key[1]] for row in rows[key[0], name]])), name)
+    )
+    head = ["controller", *(column.heading for group in columns.values() for column in group)]
+    lines = [
+        [f"`{name}`"]
+        + [figure(rows[scenario, name], column) for scenario, group in columns.items() for column in group]
+        for name in order
+    ]
+    return table(head, lines)
+
+
+def by_scenario(suite: str, controller: str, columns: Sequence[Column]) -> str:
+    """A row for each scenario, of one controller."""
+    mine = [row for row in rows_of(suite) if row["controller"] == controller]
+    names = dict.fromkeys(row["scenario"] for row in mine)
+    lines = [
+        [f"`{name}`", *(figure([row for row in mine if row["scenario"] == name], c) for c in columns)]
+        for name in names
+    ]
+    return table(["scenario", *(column.heading for column in columns)], lines)
+
+
+def _theatre(arm: str) -> str:
+    scenario = f"theatre_{arm}"
+    columns = [
+        Column(heading="tip RMS, mean", metric="tip_error_rms_mm"),
+        Column(heading="tip RMS, worst", metric="tip_error_rms_mm", of=np.max),
+        Column(heading="RCM RMS, mean", metric="rcm_error_rms_mm"),
+        Column(heading="RCM RMS, worst", metric="rcm_error_rms_mm", of=np.max),
+        Column(heading="RCM max, worst", metric="rcm_error_max_mm", of=np.max),
+        Column(heading="wall force RMS, mean [N]", metric="trocar_force_rms_n"),
+    ]
+    return by_controller("theatre", {scenario: columns}, (scenario, "rcm_error_rms_mm"))
+
+
+def _theatre_short() -> str:
+    columns = [
+        Column(heading="tip RMS, mean", metric="tip_error_rms_mm"),
+        Column(heading="RCM RMS, mean", metric="rcm_error_rms_mm"),
+        Column(heading="RCM max, worst", metric="rcm_error_max_mm", of=np.max),
+        Column(heading="force on the wall, RMS, mean [N]", metric="trocar_force_rms_n"),
+    ]
+    scenario = "theatre_lwr4plus"
+    return by_controller("theatre", {scenario: columns}, (scenario, "rcm_error_rms_mm"))
+
+
+def _breathing(kind: str, metrics: tuple[tuple[str, str], tuple[str, str]]) -> str:
+    columns = {
+        f"breathing_{kind}_{arm}": [
+            Column(heading=f"{name}: {metrics[0][0]}", metric=metrics[0][1]),
+            Column(heading=metrics[1][0], metric=metrics[1][1]),
+        ]
+        for arm, name in _ARMS.items()
+    }
+    return by_controller(f"breathing_{kind}", columns, (next(iter(columns)), metrics[0][1]))
+
+
+def _nominal() -> str:
+    columns = [
+        Column(heading="tip RMS", metric="tip_error_rms_mm"),
+        Column(heading="tip max", metric="tip_error_max_mm"),
+        Column(heading="RCM RMS", metric="rcm_error_rms_mm"),
+        Column(heading="RCM max", metric="rcm_error_max_mm"),
+    ]
+    return by_scenario("nominal", "vprnn", columns)
+
+
+RCM = (("RCM RMS", "rcm_error_rms_mm"), ("RCM max", "rcm_error_max_mm"))
+FORCE = (("force RMS [N]", "trocar_force_rms_n"), ("max [N]", "trocar_force_max_n"))
+TABLES: dict[str, Callable[[], str]] = {
+    "nominal": _nominal,
+    "theatre_short": _theatre_short,
+    "theatre_lwr4plus": lambda: _theatre("lwr4plus"),
+    "theatre_panda": lambda: _theatre("panda"),
+    "breathing_tracked": lambda: _breathing("tracked", RCM),
+    "breathing_hidden": lambda: _breathing("hidden", FORCE),
+}
+"""Every table that a page may hold."""
+
+
+def filled(text: str) -> str:
+    """`text` of a page with its tables made from the results."""
+    return re.sub(_MARKED, lambda match: match[1] + TABLES[match[2]]() + match[3], text, flags=re.S)
+
+
+def main() -> int:
+    """Write the tables into their pages."""
+    for name in PAGES:
+        page = ROOT / name
+        text = page.read_text(encoding="utf-8")
+        if (made := filled(text)) != text:
+            page.write_text(made, encoding="utf-8")
+            print(page)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,166 @@
+"""The results of a batch, as Python sees them."""
+
+import os
+import shutil
+import weakref
+from collections.abc import Iterator, Mapping
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pyarrow as pa
+
+from surgsim.api.leaderboard import Leaderboard
+from surgsim.api.run import Run, read_run
+from surgsim.compare.leaderboard import leaderboard
+from surgsim.compare.observations import Array, Observations
+from surgsim.compare.table import read_table
+from surgsim.display import count, html_table, html_title, number, text_table
+from surgsim.errors import SurgsimError, not_held
+from surgsim.report.write import write_report
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+_SHOWN = {"tip_error_rms_mm": "tip error", "rcm_error_rms_mm": "RCM error"}
+"""Metrics of the short table, with their headings: medians of the root mean squares [mm]."""
+_HEADER = ("controller", "runs", "completed", *_SHOWN.values())
+_RIGHT = (1, 2, 3, 4)
+_NOTE = "Errors: median over completed runs of the root mean square over time [mm]."
+
+
+class Comparison(Mapping[str, Run]):
+    """Runs of several scenarios, controllers and seeds: a mapping of their ids to them.
+
+    `surgsim.compare` makes one, `surgsim.read` reads one.
+
+    Args:
+        folder: The results folder.
+        table: One row per run.
+        temporary: Whether the folder is removed with this object.
+
+    Example:
+        >>> import surgsim
+        >>> found = surgsim.compare("circle_lwr4plus", controllers=["pinv", "qp"], task={"duration_s": 2.0})
+        >>> list(found)
+        ['circle_lwr4plus/pinv/base-seed0', 'circle_lwr4plus/qp/base-seed0']
+        >>> found["circle_lwr4plus/qp/base-seed0"].outcome
+        'completed'
+        >>> found.table.column("controller").to_pylist()
+        ['pinv', 'qp']
+        >>> len(found.leaderboard("tip_error_rms_mm"))
+        2
+    """
+
+    def __init__(self, folder: Path, table: pa.Table, *, temporary: bool = False) -> None:
+        self.folder = folder
+        self.table = table
+        if temporary:
+            weakref.finalize(self, shutil.rmtree, folder, ignore_errors=True)
+
+    @staticmethod
+    def of_folder(folder: str | os.PathLike[str]) -> "Comparison":
+        """The batch in a results folder.
+
+        Raises:
+            SurgsimError: If it is not finished, or damaged.
+        """
+        place = Path(folder)
+        if (place / "suite.json").is_file() and not (place / "runs.parquet").is_file():
+            there = count(len(list(place.glob("runs/*/*/*/metrics.json"))), "run")
+            raise SurgsimError(f"{place}: the batch is not finished: {there} there, no table yet")
+        return Comparison(place, read_table(place))
+
+    def __getitem__(self, run_id: str) -> Run:
+        if run_id not in self._folders:
+            raise not_held(run_id, "run of this batch", self._folders, "list(comparison)")
+        return read_run(self.folder / self._folders[run_id])
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._folders)
+
+    def __len__(self) -> int:
+        return len(self._folders)
+
+    @cached_property
+    def _folders(self) -> dict[str, str]:
+        columns = (self.table.column(name).to_pylist() for name in ("run_id", "folder"))
+        return dict(zip(*columns, strict=True))
+
+    @cached_property
+    def _runs(self) -> Observations:
+        return Observations.of(self.table)
+
+    @property
+    def controllers(self) -> list[str]:
+        """Names of the controllers."""
+        return self._runs.controllers
+
+    @property
+    def scenarios(self) -> list[str]:
+        """Names of the scenarios."""
+        return self._runs.scenarios
+
+    def to_pandas(self) -> "pd.DataFrame":
+        """The table as a data frame, one row per run, failed ones included.
+
+        Raises:
+            SurgsimError: If pandas is not installed.
+        """
+        try:
+            import pandas  # noqa: F401 - pyarrow's own message does not say how to get it
+        except ModuleNotFoundError as error:
+            raise SurgsimError("to_pandas needs pandas: pip install 'surgsim[pandas]'") from error
+        frame: pd.DataFrame = self.table.to_pandas()
+        return frame
+
+    def leaderboard(self, metric: str = "rcm_error_rms_mm") -> Leaderboard:
+        """Controllers by one metric, the best mean rank first, with intervals and failures.
+
+        Raises:
+            SurgsimError: If there is no such metric.
+        """
+        return Leaderboard(metric, leaderboard(self._runs, metric))
+
+    def report(self, path: str | os.PathLike[str] | None = None) -> Path:
+        """Write the page about the batch and return where it is.
+
+        Args:
+            path: File to write; None: `report.html` in the results folder.
+
+        Raises:
+            SurgsimError: If the disk refuses.
+        """
+        return write_report(self.folder, path)
+
+    def __repr__(self) -> str:
+        return f"{self._title}\n{text_table(_HEADER, self._summary(), _RIGHT)}\n{_NOTE}"
+
+    def _repr_html_(self) -> str:
+        return html_title(self._title, _NOTE) + html_table(_HEADER, self._summary(), _RIGHT)
+
+    @property
+    def _title(self) -> str:
+        parts = (
+            count(len(self), "run"),
+            count(len(self.scenarios), "scenario"),
+            count(len(self.controllers), "controller"),
+            count(len(set(self._runs.seed.tolist())), "seed"),
+        )
+        return f"Comparison of {', '.join(parts)}"
+
+    def _summary(self) -> list[tuple[str, ...]]:
+        """A row for each controller."""
+        rows = []
+        for name in self.controllers:
+            runs = self._runs.of_controller(name)
+            medians = [_median(runs.values(metric)) for metric in _SHOWN]
+            completed = int(runs.completed.sum())
+            rows.append((name, str(len(runs)), str(completed), *(number(value) for value in medians)))
+        return rows
+
+
+def _median(values: Array) -> float | None:
+    finite = values[np.isfinite(values)]
+    return float(np.median(finite)) if finite.size else None

@@ -1,0 +1,116 @@
+"""Two runs beside each other, for `surgsim inspect A B`."""
+
+import argparse
+import json
+import math
+import sys
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from surgsim.recording.read import Recorded
+    from surgsim.trace.trace import Trace
+
+_LONGEST_VALUE = 40
+_KINDS = ("type", "name")
+
+
+def inspect_two(paths: list[Path], options: argparse.Namespace) -> int:
+    """Print how two recorded runs differ, and write or show both on one timeline if that is asked for.
+
+    Raises:
+        SurgsimError: If one is not recorded, or the disk refuses.
+    """
+    from surgsim.cli.table import print_prose
+    from surgsim.errors import SurgsimError
+    from surgsim.recording import view
+    from surgsim.recording.pair import write_pair
+    from surgsim.recording.read import read_recording
+
+    if options.export:
+        raise SurgsimError("--export takes one recording")
+    pair = [read_recording(path) for path in paths]
+    _print_pair(paths, pair, as_json=options.json)
+    if not (options.view or options.web or options.out):
+        return 0
+    file = options.out or Path("runs") / "pair.rrd"
+    file.parent.mkdir(parents=True, exist_ok=True)
+    write_pair(file, pair)
+    print_prose(f"wrote {file}", sys.stderr)
+    if options.view:
+        view.view(file)
+    elif options.web:
+        view.serve(file)
+    return 0
+
+
+def _print_pair(paths: list[Path], pair: "list[Recorded]", as_json: bool) -> None:
+    from surgsim.cli.output import format_number
+    from surgsim.cli.table import print_prose, print_table
+    from surgsim.metrics.catalog import METRICS, compute_metrics
+
+    a, b = (compute_metrics(recorded.trace) for recorded in pair)
+    gaps = {name: _minus(b[name], a[name]) for name in METRICS}
+    scenarios = [recorded.trace.meta.scenario for recorded in pair]
+    changed = list(differing(scenarios[0], scenarios[1]))
+    if as_json:
+        settings = {key: {"a": old, "b": new} for key, old, new in changed}
+        print(json.dumps({"a": a, "b": b, "b_minus_a": gaps, "settings": settings}, indent=2))
+        return
+    for side, path in zip("ab", paths, strict=True):
+        print_prose(f"{side}: {path}")
+    print()
+    if changed:
+        rows = [(key, _shown(old), _shown(new)) for key, old, new in changed]
+        print_table("What differs", ("setting", "a", "b"), rows)
+    else:
+        print("The scenarios are the same.")
+    print()
+    shown = [name for name in METRICS if a[name] is not None or b[name] is not None]
+    table = [(name, *(format_number(values[name]) for values in (a, b, gaps))) for name in shown]
+    print_table("Metrics", ("metric", "a", "b", "b - a"), table, right=(1, 2, 3))
+    largest = format_number(largest_gap_mm(pair[0].trace, pair[1].trace))
+    print(f"\nlargest distance between the two tips: {largest} mm")
+
+
+def differing(a: Any, b: Any, path: str = "") -> Iterator[tuple[str, Any, Any]]:
+    """Key paths at which two resolved scenarios differ, with both values; None where one has no such key.
+
+    Of two parts of different type or name, that alone is said: their keys are not the same ones.
+    """
+    if isinstance(a, Mapping) and isinstance(b, Mapping):
+        for kind in _KINDS if path else ():
+            if kind in a and kind in b and a[kind] != b[kind]:
+                yield f"{path}.{kind}", a[kind], b[kind]
+                return
+        for key in dict.fromkeys([*a, *b]):
+            yield from differing(a.get(key), b.get(key), f"{path}.{key}" if path else key)
+    elif isinstance(a, list) and isinstance(b, list) and len(a) == len(b) and _are_parts(a + b):
+        for index, (one, other) in enumerate(zip(a, b, strict=True)):
+            yield from differing(one, other, f"{path}.{index}")
+    elif a != b:
+        yield path, a, b
+
+
+def _are_parts(values: list[Any]) -> bool:
+    return all(isinstance(value, dict) for value in values)
+
+
+def _shown(value: Any) -> str:
+    """A value as in a scenario, or its beginning if it is long."""
+    text = "-" if value is None else value if isinstance(value, str) else json.dumps(value)
+    return text if len(text) <= _LONGEST_VALUE else f"{text[: _LONGEST_VALUE - 3]}..."
+
+
+def _minus(b: float | None, a: float | None) -> float | None:
+    return None if a is None or b is None else b - a
+
+
+def largest_gap_mm(a: "Trace", b: "Trace") -> float | None:
+    """Largest distance of the tips [mm], over the ticks that both have and where both are finite."""
+    ticks = min(len(a), len(b))
+    gap = a.block("tip")[:ticks] - b.block("tip")[:ticks]
+    distances = (math.hypot(*row) for row in gap.tolist())
+    found = max((d for d in distances if math.isfinite(d)), default=None)
+    return None if found is None else 1e3 * found

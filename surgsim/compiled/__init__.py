@@ -1,0 +1,10 @@
+"""Compilation of kernels: laws are pure functions of arrays, so they compile as they stand.
+
+Compiled code is kept on disk, so that only the first run on a machine pays for it. `kernel` holds the
+decorator, `cache` what is kept, `identity` the key of an entry, `places` the folder, `lock` how processes
+share one compilation, and `watch` what a person is told and how long it took.
+"""
+
+from surgsim.compiled.kernel import as_parameter, compiled
+
+__all__ = ["as_parameter", "compiled"]

@@ -1,0 +1,206 @@
+"""The cache of compiled kernels: one file an entry, named by what it depends on.
+
+An entry is never changed: it is written beside its place and renamed, and an edit of the source gives another
+name. A file that is cut, damaged or not readable counts as not there, and is written again.
+"""
+
+import hashlib
+import multiprocessing
+import os
+import pickle
+import sys
+import tempfile
+import time
+import warnings
+from collections.abc import Iterator
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+from numba.core.caching import _Cache
+from numba.core.compiler import CompileResult
+from numba.core.errors import NumbaWarning
+from numba.core.serialize import dumps
+
+from surgsim.compiled import watch
+from surgsim.compiled.identity import UnknownValueError, identity
+from surgsim.compiled.lock import CompileLock
+from surgsim.compiled.places import places, prepared, usable
+
+SUFFIX = ".nbi"
+MOST_ENTRIES = 1500
+_MAGIC = b"surgsim kernel 1\n"
+_DAY_S, _HOUR_S = 86_400.0, 3_600.0
+
+
+class KernelCache(_Cache):
+    """What numba asks for compiled code of one kernel, and gives it to."""
+
+    def __init__(self, dispatcher: Any) -> None:
+        self._dispatcher = dispatcher
+        function = dispatcher.py_func
+        self._kernel = f"{function.__module__}.{function.__qualname__}".replace("<locals>.", "")
+        self._entry_of: dict[Any, str | None] = {}
+        self._locks: dict[Any, CompileLock] = {}
+        self._enabled = True
+
+    @property
+    def cache_path(self) -> str | None:
+        """The folder that is written to first."""
+        return str(places()[0])
+
+    def enable(self) -> None:
+        """Use the cache."""
+        self._enabled = True
+
+    def disable(self) -> None:
+        """Do not use the cache."""
+        self._enabled = False
+
+    def flush(self) -> None:
+        """Nothing: entries that nobody uses go by themselves."""
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        """The kernel compiled for `sig`; None if it has to be compiled."""
+        target_context.refresh()
+        entry = self._entry(sig, target_context.codegen().magic_tuple())
+        found = None if entry is None else self._load(entry, target_context)
+        if found is None and entry is not None:
+            found = self._wait(sig, entry, target_context)
+        if found is None:
+            watch.began(self._kernel)
+        else:
+            watch.loaded()
+        return found
+
+    def save_overload(self, sig: Any, data: Any) -> None:
+        """Keep the kernel that was compiled for `sig`."""
+        try:
+            entry = self._entry(sig, data.codegen.magic_tuple())
+            if entry is not None and self._may_be_kept(data):
+                _write(entry, dumps(data._reduce()))
+        finally:
+            lock = self._locks.pop(sig, None)
+            if lock is not None:
+                lock.release()
+            watch.ended(self._kernel)
+
+    def _entry(self, sig: Any, machine: Any) -> str | None:
+        """Name of the file for `sig`; None if there can be none."""
+        if not self._enabled:
+            return None
+        if sig not in self._entry_of:
+            try:
+                key = identity(self._dispatcher, sig, machine)
+                self._entry_of[sig] = f"{self._kernel[-80:]}-{key[:40]}{SUFFIX}"
+            except UnknownValueError:
+                self._entry_of[sig] = None
+        return self._entry_of[sig]
+
+    def _load(self, entry: str, target_context: Any) -> Any:
+        for place in places():
+            payload = _read(place / entry) if usable(place) else None
+            if payload is not None:
+                with suppress(Exception):  # whatever is wrong with it, it can be compiled
+                    return CompileResult._rebuild(target_context, *pickle.loads(payload))
+        return None
+
+    def _wait(self, sig: Any, entry: str, target_context: Any) -> Any:
+        """The kernel, if another process is compiling it; else this one is to, and the others wait."""
+        place = _place_to_write()
+        if place is None:
+            return None
+        lock = CompileLock(place / entry)
+        lock.acquire((place / entry).is_file)
+        found = self._load(entry, target_context)
+        if found is None:
+            self._locks[sig] = lock
+        else:
+            lock.release()
+        return found
+
+    def _may_be_kept(self, data: Any) -> bool:
+        if any(not code.can_cache for code in data.lifted) or data.library.has_dynamic_globals:
+            text = f"kernel {self._kernel} holds addresses or large global arrays, so it cannot be kept"
+            warnings.warn(text, NumbaWarning, stacklevel=2)
+            return False
+        return True
+
+
+def _read(path: Path) -> bytes | None:
+    """Content of an entry; None if there is none, or it is not what was written."""
+    try:
+        content = path.read_bytes()
+        if time.time() - path.stat().st_mtime > _DAY_S:
+            with suppress(OSError):
+                os.utime(path)  # it is in use: it goes last
+    except OSError:
+        return None
+    head, payload = content[: len(_MAGIC) + 32], content[len(_MAGIC) + 32 :]
+    return payload if head == _MAGIC + hashlib.sha256(payload).digest() else None
+
+
+def _write(entry: str, payload: bytes) -> None:
+    """Write an entry to the first place that takes it; if none does, say so once."""
+    content = _MAGIC + hashlib.sha256(payload).digest() + payload
+    for place in places():
+        if prepared(place) and _written(place, entry, content):
+            return
+    _complain()
+
+
+def _written(place: Path, entry: str, content: bytes) -> bool:
+    draft: str | None = None
+    try:
+        handle, draft = tempfile.mkstemp(prefix=".", suffix=".part", dir=place)
+        with os.fdopen(handle, "wb") as stream:
+            stream.write(content)
+        if place.stat().st_mode & 0o004:
+            os.chmod(draft, 0o644)
+        os.replace(draft, place / entry)
+    except OSError:
+        if draft is not None:
+            with suppress(OSError):
+                os.unlink(draft)
+        return False
+    _evict(place)
+    return True
+
+
+def _place_to_write() -> Path | None:
+    return next((place for place in places() if prepared(place)), None)
+
+
+def _evict(place: Path) -> None:
+    """Remove what was not used for longest, and what killed processes left."""
+    with suppress(OSError):
+        entries = sorted(_files(place, SUFFIX))
+        for _, path in entries[: max(0, len(entries) - MOST_ENTRIES)]:
+            path.unlink(missing_ok=True)
+        old = time.time() - _HOUR_S
+        for used, path in (*_files(place, ".part"), *_files(place, ".lock")):
+            if used < old:
+                path.unlink(missing_ok=True)
+
+
+def _files(place: Path, suffix: str) -> Iterator[tuple[float, Path]]:
+    """When each file of a kind was used, and its path."""
+    with os.scandir(place) as found:
+        for item in found:
+            if item.name.endswith(suffix):
+                with suppress(OSError):
+                    yield item.stat().st_mtime, Path(item.path)
+
+
+_complained = False
+
+
+def _complain() -> None:
+    global _complained
+    if not _complained and multiprocessing.parent_process() is None:
+        tried = ", ".join(map(str, places()))
+        print(
+            f"surgsim: kernels are compiled at every start: none of these folders can be written: {tried}",
+            file=sys.stderr,
+        )
+    _complained = True

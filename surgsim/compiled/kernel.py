@@ -1,0 +1,67 @@
+"""The decorator that makes a kernel of a function."""
+
+import inspect
+import warnings
+from collections.abc import Callable
+from typing import Any, TypeVar, cast, overload
+
+import numba
+from numba.core.errors import NumbaExperimentalFeatureWarning
+from numba.core.typeinfer import register_dispatcher
+from numba.extending import is_jitted
+
+from surgsim.compiled.cache import KernelCache
+from surgsim.compiled.watch import declare
+
+Function = TypeVar("Function", bound=Callable[..., Any])
+
+
+@overload
+def compiled(function: Function, /) -> Function: ...
+@overload
+def compiled(*signatures: Any) -> Callable[[Function], Function]: ...
+def compiled(*given: Any) -> Any:
+    """Compile a function of arrays and numbers; IEEE arithmetic is kept as written, the GIL is released.
+
+    `@compiled` compiles at the first call, for the types that it is called with. `@compiled(SIGNATURE)`
+    compiles, or loads what is kept, when its module is imported, and takes no other types. Such a kernel can
+    be passed to another one as a parameter of the type `numba.types.FunctionType(SIGNATURE)`.
+
+    Raises:
+        numba.core.errors.NumbaError: If the function does not compile for a signature.
+        TypeError: If what is decorated is no function.
+    """
+    if len(given) == 1 and inspect.isfunction(given[0]):
+        return _kernel(given[0], ())
+    return lambda function: _kernel(function, given)
+
+
+def _kernel(function: Function, signatures: tuple[Any, ...]) -> Function:
+    made: Any = numba.njit(nogil=True, error_model="numpy")(function)
+    if not is_jitted(made):  # numba is told to leave Python functions alone
+        return function
+    dispatcher: Any = made
+    dispatcher._cache = KernelCache(dispatcher)  # as `cache=True` would set numba's own
+    declare(dispatcher)
+    if signatures:
+        with warnings.catch_warnings(), register_dispatcher(dispatcher):
+            warnings.filterwarnings("ignore", "First-class function type", NumbaExperimentalFeatureWarning)
+            for signature in signatures:
+                dispatcher.compile(signature)
+        dispatcher.disable_compile()
+    return cast(Function, dispatcher)
+
+
+_AS_PARAMETERS: dict[tuple[Any, Any], Any] = {}
+
+
+def as_parameter(kernel: Any, signature: Any) -> Any:
+    """The `@compiled` function as a parameter of the type `numba.types.FunctionType(signature)`.
+
+    It is compiled for this signature, or loaded, when it is first asked for; `@compiled(SIGNATURE)` would do
+    so at import, when the number of joints is not yet known.
+    """
+    key = (kernel.py_func, signature)
+    if key not in _AS_PARAMETERS:
+        _AS_PARAMETERS[key] = compiled(signature)(kernel.py_func)
+    return _AS_PARAMETERS[key]

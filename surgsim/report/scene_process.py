@@ -1,0 +1,81 @@
+"""What the scenes of some scenarios look like, worked out in a process of its own.
+
+A machine without OpenGL may end the process that draws, or leave it waiting. So the report asks this one, by
+JSON on standard input and output, and does without its answer where there is none.
+"""
+
+import base64
+import io
+import json
+import sys
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from surgsim.errors import SurgsimError
+from surgsim.models.build import build
+from surgsim.models.picture import render
+from surgsim.scenario.load import load_scenario
+from surgsim.scenario.schema import Scenario
+from surgsim.simulate.setup import prepare
+
+MOST = 2
+"""Scenes that are drawn: the first of each robot."""
+WIDTH, HEIGHT = 880, 560
+_QUALITY = 80
+
+
+def main(asked: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """Scenes of the first scenario of each robot; `scenarios` are names or paths, `draw` wants pictures."""
+    found: dict[str, dict[str, Any]] = {}
+    for name in asked["scenarios"]:
+        try:
+            scenario = load_scenario(name)
+            if scenario.robot.name not in found:
+                found[scenario.robot.name] = _scene(scenario, draw=bool(asked["draw"]))
+        except SurgsimError:
+            continue  # a scenario that is no longer at hand; another may be
+        if len(found) == MOST:
+            break
+    return list(found.values())
+
+
+def _scene(scenario: Scenario, *, draw: bool) -> dict[str, Any]:
+    """Points of the arm at its start, the port, the tip's path, and a picture as JPEG in base64."""
+    setup = prepare(scenario)
+    kin = setup.arm.kinematics(setup.q_start)
+    trocar = scenario.trocar
+    return {
+        "scenario": scenario.name,
+        "robot": scenario.robot.name,
+        "base": list(scenario.robot.base_position_m),
+        "joints": _points(kin.anchors_W),
+        "tip": kin.p_WT.tolist(),
+        "trocar": None if trocar is None else list(trocar.position_m),
+        "path": _points([point for _, point in setup.task.reach()]),
+        "picture": _picture(scenario, setup.q_start) if draw else None,
+    }
+
+
+def _points(points: Sequence[Any] | np.ndarray) -> list[list[float]]:
+    return [[float(x) for x in point] for point in points]
+
+
+def _picture(scenario: Scenario, q: np.ndarray) -> str | None:
+    """The scene as camera `overview` sees it; None where this machine cannot draw."""
+    from PIL import Image
+
+    config = scenario.scene.model_copy(update={"theatre": True})
+    try:
+        pixels = render(build(config), q, "overview", WIDTH, HEIGHT)
+    except SurgsimError:
+        return None
+    written = io.BytesIO()
+    Image.fromarray(pixels).save(written, "JPEG", quality=_QUALITY, optimize=True)
+    return base64.b64encode(written.getvalue()).decode()
+
+
+if __name__ == "__main__":
+    answer = main(json.load(sys.stdin))
+    sys.stdout.write(json.dumps(answer))

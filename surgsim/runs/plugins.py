@@ -1,0 +1,93 @@
+"""Which other packages gave a part to a run, and which file its policy stands in."""
+
+import sys
+from collections.abc import Iterator
+from functools import cache
+from importlib.metadata import distributions
+from pathlib import Path
+from typing import Any
+
+from pydantic import BaseModel
+
+from surgsim.catalog import PartConfig
+from surgsim.control.policies.registry import find_policy
+from surgsim.control.resolvers.policy import PolicyConfig
+from surgsim.errors import SurgsimError
+from surgsim.runs.sources import hash_of, package_sha256
+from surgsim.scenario.schema import Scenario
+
+
+def plugins_of(scenario: Scenario) -> dict[str, dict[str, Any]]:
+    """Version and hash of the sources of each package, other than surgsim, that gave a part to `scenario`.
+
+    A module that belongs to no installed package has no version.
+    """
+    found = {}
+    for part in _parts(scenario):
+        for module in _modules(part):
+            package = module.partition(".")[0]
+            if package != "surgsim" and (told := _told(package)):
+                found[package] = told
+    return dict(sorted(found.items()))
+
+
+def policies_of(scenario: Scenario) -> dict[str, str | None]:
+    """Hash of the file that each policy of `scenario` stands in; None for one that stands in no file."""
+    names = {part.name for part in _parts(scenario) if isinstance(part, PolicyConfig)}
+    return {name: _file_hash(_home(_policy(name))) for name in sorted(names)}
+
+
+def _parts(value: Any) -> Iterator[PartConfig]:
+    """Every part of a scenario, those inside of others too."""
+    if isinstance(value, PartConfig):
+        yield value
+    if isinstance(value, BaseModel):
+        for name in type(value).model_fields:
+            yield from _parts(getattr(value, name))
+    elif isinstance(value, tuple | list):
+        for item in value:
+            yield from _parts(item)
+    elif isinstance(value, dict):
+        yield from _parts(tuple(value.values()))
+
+
+def _modules(part: PartConfig) -> Iterator[str]:
+    yield type(part).__module__
+    if isinstance(part, PolicyConfig):
+        yield _home(_policy(part.name))
+
+
+def _policy(name: str) -> Any:
+    try:
+        return find_policy(name)
+    except SurgsimError:  # of a run that was refused for it
+        return None
+
+
+def _home(policy: Any) -> str:
+    """Module of a function, or of the class of an object that can be called."""
+    return getattr(policy, "__module__", None) or type(policy).__module__
+
+
+def _file_hash(module: str) -> str | None:
+    file = getattr(sys.modules.get(module), "__file__", None)
+    return hash_of([("policy", Path(file))]) if file and Path(file).is_file() else None
+
+
+@cache
+def _told(package: str) -> dict[str, Any] | None:
+    """Version and hash of a package that was imported; None if it has no file."""
+    file = getattr(sys.modules.get(package), "__file__", None)
+    if not file:
+        return None
+    place = Path(file).parent if Path(file).name == "__init__.py" else Path(file)
+    return {"version": _version(package, place), "sources_sha256": package_sha256(place)}
+
+
+def _version(package: str, place: Path) -> str | None:
+    """Version of the installed distribution that `package` belongs to."""
+    for one in distributions():
+        points = (point for point in one.entry_points if point.group.startswith("surgsim."))
+        if any(point.value.partition(":")[0].partition(".")[0] == package for point in points):
+            return one.version
+    return None

@@ -1,0 +1,114 @@
+"""A terminal as a person has one: commands run in it with a width, and keys can be pressed."""
+
+import fcntl
+import os
+import pty
+import re
+import select
+import signal
+import struct
+import subprocess
+import sys
+import termios
+import time
+from dataclasses import dataclass, field
+
+import pytest
+
+# A session of its own with the terminal as its controlling one, so that Ctrl-C reaches the command.
+_TAKE_TERMINAL = """
+import fcntl, os, sys, termios
+fcntl.ioctl(0, termios.TIOCSCTTY, 0)
+os.execv(sys.argv[1], sys.argv[1:])
+"""
+_ESCAPE = re.compile(r"\x1b\[[0-?]*[ -/]*[@-~]|\x1b[@-_]")
+
+
+@dataclass
+class Typed:
+    """A command that runs, or has run, in a terminal.
+
+    Attributes:
+        process: It.
+        screen: Our end of its terminal.
+        output: What it has written so far, with every escape sequence.
+    """
+
+    process: subprocess.Popen
+    screen: int
+    output: bytearray = field(default_factory=bytearray)
+
+    def wait(self, timeout_s=200.0, until=lambda: False):
+        """Read what it writes, until it ends or `until()`."""
+        end = time.monotonic() + timeout_s
+        while not until():
+            assert time.monotonic() < end, f"it does not end:\n{self.text}"
+            if not select.select([self.screen], [], [], 0.02)[0]:
+                continue
+            try:
+                piece = os.read(self.screen, 65536)
+            except OSError:  # the other end is closed: it has ended
+                piece = b""
+            if not piece:
+                self.process.wait(timeout=60)
+                break
+            self.output += piece
+        return self
+
+    def press(self, keys):
+        os.write(self.screen, keys)
+
+    @property
+    def status(self):
+        return self.process.returncode
+
+    @property
+    def text(self):
+        """What it wrote, without colours and cursor movements."""
+        return _ESCAPE.sub("", self.output.decode().replace("\r\n", "\n"))
+
+    @property
+    def lines(self):
+        """Every line that was on the screen at some time: those that were drawn over as well."""
+        return [line.rstrip() for line in re.split(r"[\n\r]+", self.text) if line.strip()]
+
+
+@pytest.fixture
+def terminal(tmp_path):
+    """Starts a command in a terminal of some columns, in a folder."""
+    started = []
+
+    def start(*words, columns=80, cwd=tmp_path, env=None):
+        ours, theirs = pty.openpty()
+        fcntl.ioctl(theirs, termios.TIOCSWINSZ, struct.pack("HHHH", 50, columns, 0, 0))
+        unwanted = ("COLUMNS", "LINES", "NO_COLOR", "FORCE_COLOR")
+        environment = {key: value for key, value in os.environ.items() if key not in unwanted}
+        process = subprocess.Popen(
+            [sys.executable, "-c", _TAKE_TERMINAL, *words],
+            cwd=cwd,
+            env={**environment, "TERM": "xterm-256color", **(env or {})},
+            stdin=theirs,
+            stdout=theirs,
+            stderr=theirs,
+            start_new_session=True,
+        )
+        os.close(theirs)
+        started.append(Typed(process, ours))
+        return started[-1]
+
+    yield start
+    for typed in started:
+        if typed.process.poll() is None:
+            os.killpg(typed.process.pid, signal.SIGKILL)
+            typed.process.wait()
+        os.close(typed.screen)
+
+
+@pytest.fixture
+def surgsim(terminal):
+    """Starts `surgsim` in a terminal."""
+
+    def start(*words, **options):
+        return terminal(sys.executable, "-W", "error", "-m", "surgsim", *words, **options)
+
+    return start

@@ -1,0 +1,170 @@
+"""Every command of the documents, as a person runs it: in a terminal of 80 and of 120 columns, to its end.
+
+The commands are read from the fenced `bash` blocks, so that a new one is tested without further edits. What
+is shortened, what ends otherwise than with 0, and what cannot be run here is listed below.
+"""
+
+import itertools
+import re
+import shlex
+import sys
+from pathlib import Path
+
+import pytest
+
+from surgsim.metrics.catalog import METRICS
+from surgsim.scenario.load import shipped
+
+ROOT = Path(__file__).parents[2]
+PAGES = sorted(
+    page
+    for pattern in ("README.md", "CONTRIBUTING.md", "docs/**/*.md", "benchmarks/*.md")
+    for page in ROOT.glob(pattern)
+)
+WINDOW, PERSON = "opens a window", "needs a person at a window"
+INSTALLS, DRAWS = "installs and builds: .ci/run calls it", "draws pictures for minutes"
+NOT_HERE = {
+    "make run": INSTALLS,
+    "make test": INSTALLS,
+    "make test-all": INSTALLS,
+    "make check": INSTALLS,
+    "source .venv/bin/activate": "the tests have an environment already",
+    "surgsim run peg_and_ring_panda --operator keyboard": PERSON,
+    "surgsim run teleop_wall_panda --operator gamepad --set task.duration_s=300": PERSON,
+    "surgsim inspect runs/tilted_circle/vprnn-seed0 --view": WINDOW,
+    "surgsim compare full --engine ray --address 10.0.0.1:6379 --out runs/full": "needs a cluster",
+    "python docs/images/controllers.py": DRAWS,
+    "python docs/images/controllers.py frontier": DRAWS,
+    "python benchmarks/batch.py": "a measurement of the machine, for minutes",
+    "python benchmarks/batch.py --runs 100 --pairs 1": "a measurement of the machine, for minutes",
+}
+# What is added to a command so that it ends soon: the same command otherwise.
+SHORT = "--set task.duration_s=3.0 --set task.hold_end_s=0.0"
+FEW = f"{SHORT} --controllers vprnn,pinv --seeds 0:1"
+SHORTER = {
+    "surgsim compare quick --out runs/quick": FEW,
+    "surgsim compare quick --out runs/quick --resume": FEW,
+    "surgsim compare circle_lwr4plus --controllers vprnn,joint_impedance --seeds 0:2 --out runs/two": SHORT,
+    "surgsim compare circle_lwr4plus spiral_lwr4plus --controllers vprnn,rcm_inverse_dynamics --seeds 0:5": (
+        f"{SHORT} --seeds 0:1"
+    ),
+    "surgsim compare seeds --out runs/seeds --shard 1/2": FEW,
+    "surgsim compare seeds --out runs/seeds --shard 2/2": FEW,
+    "surgsim compare seeds --out runs/seeds --resume": FEW,
+    "surgsim compare circle_lwr4plus --controllers vprnn,policy_proportional": SHORT,
+    "surgsim compare circle_lwr4plus --controllers vprnn,pinv --set task.radius_m=0.01 "
+    "--out runs/small_circle": SHORT,
+    "surgsim compare theatre --out runs/theatre": f"{SHORT} --controllers vprnn --seeds 0:2",
+    "surgsim compare breathing_tracked --out runs/breathing_tracked": f"{SHORT} --controllers vprnn",
+    "surgsim compare breathing_hidden --out runs/breathing_hidden": f"{SHORT} --controllers vprnn",
+    "surgsim compare robustness --seeds 0:1 --controllers vprnn,joint_impedance,rcm_inverse_dynamics "
+    "--out runs/robustness": "--controllers vprnn",
+    "surgsim compare frontier --seeds 0:1 --out runs/frontier": "--controllers joint_impedance",
+    "surgsim compare torque_level --out runs/torque_level": "--controllers rcm_inverse_dynamics",
+    "surgsim bench": "--duration 1 --repeat 1",
+    "surgsim bench --duration 5 --repeat 3 --json": "--duration 1 --repeat 1",
+}
+SLOW = (
+    "surgsim reproduce ",
+    "surgsim bench",
+    "surgsim compare robustness ",
+    "surgsim compare frontier ",
+    "surgsim compare torque_level ",
+)
+STATUS = {
+    "surgsim compare seeds --out runs/seeds --shard 1/2": 1,  # the other shard is missing
+}
+
+
+def commands(page):
+    """The commands of a page's `bash` blocks, without what is said of them."""
+    blocks = re.findall(r"^```bash\n(.*?)^```$", page.read_text(), re.M | re.S)
+    lines = "".join(blocks).replace("\\\n", " ").splitlines()
+    words = [shlex.split(line, comments=True) for line in lines]
+    return [shlex.join(line) for line in words if line]
+
+
+def files(page):
+    """Name and content of every file that a page tells a reader to save."""
+    return re.findall(r"^Save this as `([\w.]+)`.*?\n```yaml\n(.*?)^```$", page.read_text(), re.M | re.S)
+
+
+def plain(command):
+    """A command as it is written, whatever its quotes."""
+    return shlex.join(shlex.split(command))
+
+
+LISTED = [*NOT_HERE, *SHORTER, *STATUS]
+ALL = {page: commands(page) for page in PAGES}
+
+
+def test_what_is_listed_is_documented():
+    documented = {command for page in ALL.values() for command in page}
+    assert [command for command in LISTED if plain(command) not in documented] == []
+    assert len(documented) > 40
+
+
+def cases(slow):
+    """(page, commands) to be run one after the other: a page's, or a slow one alone."""
+    for page, found in ALL.items():
+        here = [command for command in found if command not in NOT_HERE]
+        for command in here if slow else ():
+            if command.startswith(SLOW):
+                yield pytest.param(page, [command], id=command.replace("/", "_"))
+        rest = [command for command in here if not command.startswith(SLOW)]
+        if rest and not slow:
+            yield pytest.param(page, rest, id=str(page.relative_to(ROOT)).replace("/", "_"))
+
+
+@pytest.mark.parametrize("columns", [80, 120])
+@pytest.mark.parametrize(("page", "typed"), list(cases(slow=False)))
+def test_the_commands_of_a_page(terminal, tmp_path, page, typed, columns):
+    run_all(terminal, tmp_path, page, typed, columns)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("columns", [80, 120])
+@pytest.mark.parametrize(("page", "typed"), list(cases(slow=True)))
+def test_a_slow_command(terminal, tmp_path, page, typed, columns):
+    run_all(terminal, tmp_path, page, typed, columns)
+
+
+def run_all(terminal, folder, page, typed, columns):
+    """Type the commands and look at each when it has ended."""
+    for name, text in files(page):
+        (folder / name).write_text(text)
+    for command in typed:
+        program, *words = shlex.split(f"{command} {SHORTER.get(command, '')}")
+        assert program == "surgsim", f"list {command} in NOT_HERE with a reason, or run it here"
+        done = terminal(sys.executable, "-W", "error", "-m", program, *words, columns=columns)
+        done.wait(timeout_s=600.0)
+        print(f"$ {command}\n{done.text}")
+        assert done.status == STATUS.get(command, 0), command
+        assert "Traceback" not in done.text
+        assert too_wide(done.lines, columns) == []
+        assert broken(done.lines) == []
+
+
+def too_wide(lines, columns):
+    """Lines that a terminal would break; a single word, such as a path, may be longer than it is wide."""
+    return [line for line in lines if len(line) > columns and " " in line.strip()]
+
+
+NAMES = {*METRICS, *shipped(), *shipped("controllers"), *shipped("suites")}
+
+
+def broken(lines):
+    """Names that stand partly at a line's end and partly at the next one's start."""
+    found = []
+    for above, below in itertools.pairwise(lines):
+        start, end = above.split()[-1], below.split()[0]
+        if start + end in NAMES and start not in NAMES:
+            found.append((above, below))
+    return found
+
+
+def test_the_checks_above_catch_what_they_should():
+    assert too_wide(["x " * 41], 80)
+    assert not too_wide(["x" * 200, "x " * 40 + "x"], 81)
+    assert broken(["12.5  rcm_error_", "rms_mm  x"])
+    assert not broken(["12.5  rcm_error_rms_mm", "rcm_error_max_mm"])

@@ -1,0 +1,173 @@
+"""Ctrl-C and SIGTERM in a run or a batch: only whole results, no draft, and `--resume` goes on."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from surgsim.compare.table import read_table
+from surgsim.runs.stop import Stopped, stopping_in_order
+
+SHORT = [
+    "theatre=false",
+    "task.ramp_s=0.1",
+    "task.hold_start_s=0",
+    "task.hold_end_s=0",
+    "task.radius_m=0.002",
+]
+LONG_RUN = ["run", "circle_lwr4plus", "--out", "out/run", "--set", "task.duration_s=20"]
+FILES = {"scenario.yaml", "metrics.json", "recording.rrd"}
+
+
+@pytest.fixture
+def surgsim(terminal):
+    """Starts `surgsim` in a terminal; not `-W error`: a signal may meet a `git` that is being started."""
+
+    def start(*words, **options):
+        return terminal(sys.executable, "-m", "surgsim", *words, **options)
+
+    return start
+
+
+def words(*more):
+    return [word for setting in (*SHORT, *more) for word in ("--set", setting)]
+
+
+def draft_in(folder):
+    return lambda: any(path.name.endswith(".part") for path in folder.glob(".run.*"))
+
+
+ENDED = {
+    "Ctrl-C": (130, "surgsim: interrupted; nothing half done is left"),
+    "SIGINT": (130, "surgsim: interrupted; nothing half done is left"),
+    "SIGTERM": (143, "surgsim: ended by SIGTERM; nothing half done is left"),
+    "SIGHUP": (129, "surgsim: ended by SIGHUP; nothing half done is left"),
+}
+
+
+@pytest.mark.parametrize("how", ENDED)
+def test_a_run_that_is_ended_while_it_is_written_leaves_nothing(surgsim, tmp_path, how):
+    typed = surgsim(*LONG_RUN).wait(until=draft_in(tmp_path / "out"))
+    if how == "Ctrl-C":
+        typed.press(b"\x03")
+    else:
+        os.kill(typed.process.pid, getattr(signal, how))
+        os.kill(typed.process.pid, getattr(signal, how))  # as `timeout` does
+    typed.wait()
+    status, text = ENDED[how]
+    assert (typed.status, typed.lines[-1]) == (status, text)
+    assert "Traceback" not in typed.text
+    assert list((tmp_path / "out").iterdir()) == []
+
+
+@pytest.mark.parametrize("how", ["Ctrl-C", "SIGTERM"])
+def test_a_run_that_is_ended_on_its_way_leaves_nothing(surgsim, tmp_path, how):
+    typed = surgsim(*LONG_RUN)
+    typed.wait(until=lambda: "x real time" in typed.text)
+    if how == "Ctrl-C":
+        typed.press(b"\x03")
+    else:
+        os.kill(typed.process.pid, signal.SIGTERM)
+    typed.wait()
+    assert (typed.status, typed.lines[-1]) == ENDED[how]
+    assert list(tmp_path.rglob("*")) == []
+
+
+def test_what_a_killed_run_left_goes_with_the_next(surgsim, tmp_path):
+    typed = surgsim(*LONG_RUN).wait(until=draft_in(tmp_path / "out"))
+    os.killpg(typed.process.pid, signal.SIGKILL)
+    typed.process.wait()
+    assert [path.suffix for path in (tmp_path / "out").iterdir()] == [".part"]
+    done = surgsim("run", "circle_lwr4plus", "--out", "out/run", *words("task.duration_s=0.2")).wait()
+    assert done.status == 0, done.text
+    assert [path.name for path in (tmp_path / "out").iterdir()] == ["run"]
+    assert {path.name for path in (tmp_path / "out" / "run").iterdir()} == FILES
+
+
+SUITE = """\
+name: tiny
+scenarios: [circle_lwr4plus]
+controllers: [pinv]
+seeds: "0:6"
+record: true
+settings: [theatre=false, task.duration_s=0.5, task.ramp_s=0.1, task.hold_start_s=0, task.hold_end_s=0]
+"""
+
+
+@pytest.mark.parametrize("how", ["Ctrl-C", "SIGTERM", "SIGTERM to all"])
+def test_a_batch_that_is_ended_is_gone_on_with(surgsim, tmp_path, how):
+    (tmp_path / "tiny.yaml").write_text(SUITE)
+    command = ["compare", "tiny.yaml", "--out", "out", "--jobs", "2"]
+    typed = surgsim(*command)
+    typed.wait(until=lambda: any(whole_runs(tmp_path)))
+    children = Path(f"/proc/{typed.process.pid}/task/{typed.process.pid}/children").read_text().split()
+    if how == "Ctrl-C":
+        typed.press(b"\x03")
+    elif how == "SIGTERM":
+        os.kill(typed.process.pid, signal.SIGTERM)
+    else:  # as a cluster at the end of the time limit
+        os.killpg(typed.process.pid, signal.SIGTERM)
+    typed.wait()
+    told = "interrupted" if how == "Ctrl-C" else "ended by SIGTERM"
+    assert typed.lines[-1] == f"surgsim: {told}; --resume --out out runs what is missing"
+    assert typed.status == (130 if how == "Ctrl-C" else 143)
+    assert "Traceback" not in typed.text
+    end = time.monotonic() + 30.0
+    while any(alive(pid) for pid in children):
+        assert time.monotonic() < end, "processes are left"
+        time.sleep(0.02)
+    whole = whole_runs(tmp_path)
+    assert 1 <= len(whole) < 6
+    assert all({path.name for path in folder.iterdir()} == FILES for folder in whole)
+    assert [path for path in tmp_path.rglob("*") if path.name.startswith(".")] == []
+    again = surgsim(*command, "--resume").wait()
+    assert again.status == 0, again.text
+    assert read_table(tmp_path / "out")["outcome"].to_pylist() == ["completed"] * 6
+    assert whole.items() <= whole_runs(tmp_path).items(), "a whole run was done again"
+
+
+def whole_runs(folder):
+    """Folders of the runs that are whole, with the time at which each was written."""
+    found = folder.glob("out/runs/*/*/[!.]*/metrics.json")
+    return {path.parent: path.stat().st_mtime_ns for path in found}
+
+
+def alive(pid):
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except OSError:
+        return False
+
+
+def test_a_signal_that_is_ignored_stays_so():
+    """`nohup surgsim compare ... &` survives the end of the terminal."""
+    code = (
+        "import os, signal; signal.signal(signal.SIGHUP, signal.SIG_IGN)\n"
+        "from surgsim.runs.stop import stopping_in_order\n"
+        "with stopping_in_order(): os.kill(os.getpid(), signal.SIGHUP); print('here')"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60)
+    assert (done.returncode, done.stdout) == (0, "here\n"), done.stderr
+
+
+def test_a_second_signal_does_not_disturb_the_tidying_and_handlers_are_put_back():
+    before = signal.getsignal(signal.SIGTERM)
+    tidied = []
+
+    def command():
+        try:
+            os.kill(os.getpid(), signal.SIGTERM)
+            time.sleep(1.0)
+        finally:
+            os.kill(os.getpid(), signal.SIGTERM)
+            time.sleep(0.01)
+            tidied.append(True)
+
+    with pytest.raises(Stopped, match="SIGTERM"), stopping_in_order():
+        command()
+    assert tidied
+    assert signal.getsignal(signal.SIGTERM) is before

@@ -1,0 +1,87 @@
+"""What `make pictures` makes is that of the current figures: tables, pictures, pages of the leaderboard."""
+
+import importlib
+import re
+import sys
+from pathlib import Path
+
+import pyarrow.parquet as pq
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+AGAIN = "run `make pictures`"
+
+
+@pytest.fixture(scope="module")
+def made():
+    """The scripts of `docs/images`, which import one another by name."""
+    sys.path.insert(0, str(ROOT / "docs" / "images"))
+    try:
+        yield importlib.import_module("draw"), importlib.import_module("tables")
+    finally:
+        sys.path.pop(0)
+
+
+def test_the_tables_of_the_documents_are_those_of_the_results(made):
+    _, tables = made
+    found = set()
+    for name in tables.PAGES:
+        text = (ROOT / name).read_text(encoding="utf-8")
+        assert tables.filled(text) == text, f"{name} holds other figures than results/leaderboard: {AGAIN}"
+        found |= set(re.findall(r"<!-- table (\w+) -->", text))
+    assert found == set(tables.TABLES)  # none is made for nothing, none has an unknown name
+
+
+def test_a_wrong_figure_in_a_table_is_found(made):
+    _, tables = made
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    wrong = text.replace("| 0.638 |", "| 0.639 |")
+    assert wrong != text
+    assert tables.filled(wrong) == text
+
+
+def test_the_reference_runs_are_as_many_as_their_page_says():
+    text = (ROOT / "results" / "leaderboard" / "README.md").read_text(encoding="utf-8")
+    told = dict(re.findall(r"^\| `(\w+)/` \| .*? \| (\d+) \|", text, re.M))
+    held = {
+        path.parent.name: str(pq.read_metadata(path).num_rows)
+        for path in (ROOT / "results" / "leaderboard").glob("*/runs.parquet")
+    }
+    assert told == held
+
+
+def test_what_the_readme_says_of_our_controller_holds_in_the_rows():
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    said = re.search(r"same LWR4\+ scenarios: tip RMS at most ([\d.]+) mm, RCM max at most ([\d.]+) mm", text)
+    rows = pq.read_table(ROOT / "results/leaderboard/nominal/runs.parquet").to_pylist()
+    ours = [r for r in rows if r["controller"] == "rcm_inverse_dynamics" and "lwr4plus" in r["scenario"]]
+    assert max(r["tip_error_rms_mm"] for r in ours) <= float(said[1])
+    assert max(r["rcm_error_max_mm"] for r in ours) <= float(said[2])
+
+
+@pytest.mark.parametrize("file", ["theatre.png", "port_closeup.png", "panda.png"])
+def test_the_pictures_are_those_of_the_current_scenes(made, file):
+    draw, _ = made
+    assert draw.stamped(draw.HERE / file) == draw.scene_stamp(*draw.SCENES[file]), AGAIN
+
+
+def test_the_picture_of_the_paths_is_that_of_the_current_paths(made):
+    draw, _ = made
+    assert draw.stamped(draw.HERE / "paths.png") == draw.paths_stamp(), AGAIN
+
+
+@pytest.mark.parametrize(
+    "suite", ["nominal", "theatre", "seeds", "rings", "breathing_tracked", "breathing_hidden"]
+)
+def test_the_pages_of_the_leaderboard_say_what_their_rows_say(suite):
+    from surgsim.compare.leaderboard import leaderboard
+    from surgsim.compare.summary import summary
+    from surgsim.report import html
+    from surgsim.report.results import read_results
+
+    results = read_results(ROOT / "results" / "leaderboard" / suite)
+    metric = results.headline[0]
+    told = summary(results.runs, metric, leaderboard(results.runs, metric))
+    page = (results.folder / "report.html").read_text(encoding="utf-8")
+    assert html.paragraph(told.first, "lead") in page, AGAIN
+    assert all(f": {html.escape(one.text)}.</li>" in page for one in told.failing), AGAIN
