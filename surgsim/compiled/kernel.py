@@ -13,6 +13,9 @@ from numba.extending import is_jitted
 from surgsim.compiled.cache import KernelCache
 from surgsim.compiled.watch import declare
 
+# Kernels are parameters of kernels: numba says so at every call with a tuple of them.
+warnings.filterwarnings("ignore", "First-class function type", NumbaExperimentalFeatureWarning)
+
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 
@@ -44,8 +47,7 @@ def _kernel(function: Function, signatures: tuple[Any, ...]) -> Function:
     dispatcher._cache = KernelCache(dispatcher)  # as `cache=True` would set numba's own
     declare(dispatcher)
     if signatures:
-        with warnings.catch_warnings(), register_dispatcher(dispatcher):
-            warnings.filterwarnings("ignore", "First-class function type", NumbaExperimentalFeatureWarning)
+        with register_dispatcher(dispatcher):
             for signature in signatures:
                 dispatcher.compile(signature)
         dispatcher.disable_compile()

@@ -219,11 +219,17 @@ class DynamicPlant:
         self.bore = self._port.bore
         signature = advance_signature(len(scene.dof_ids))
         self._begin, self.advance = as_parameter(begin, signature), as_parameter(advance_dynamics, signature)
+        self._look = as_parameter(look, signature)
         self._ledger = EnergyLedger(scene, self._data, self._port) if energy_ledger else None
         self._joint_columns, places = joint_columns(scene.model)
         self._table = self._hooks(places)
         self._points = PointReader(scene, self._data)
         self._contacts = ContactWatch(scene, self._data)
+
+    @property
+    def parts(self) -> tuple[PlantPart, ...]:
+        """Disturbances and props, in the scenario's order."""
+        return self._parts
 
     @property
     def watch(self) -> ContactWatch:
@@ -298,6 +304,18 @@ class DynamicPlant:
         if self._ledger is not None:
             self._ledger.start()
         self._told(self._begin(world, self.bore, self._table.arrays, self._table.functions))
+        return self.state()
+
+    def set_velocity(self, v: Array) -> State:
+        """Let the arm move with joint velocities `v` (n,) [rad/s] from here on."""
+        self._data.qvel[self._scene.dof_ids] = v
+        return self.see()
+
+    def see(self) -> State:
+        """Look again, after MuJoCo's data were changed from outside."""
+        mujoco.mj_step1(self._scene.model, self._data)
+        table = self._table
+        self._told(self._look(self.world, self.bore, table.arrays, table.functions))
         return self.state()
 
     def _start_parts(self) -> None:

@@ -73,7 +73,7 @@ def _let_go(setup, q, v, ticks):
     """Height lost by the wrist with the torque taken away, from the state of a stop's first row [m]."""
     plant = setup.plant
     plant.reset(q)
-    plant._qvel[:] = v
+    plant.set_velocity(v)
     before = plant.truth().p_WR[2]
     for _ in range(ticks):
         plant.step(np.zeros(7), np.zeros(7))

@@ -6,12 +6,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from surgsim.control.resolvers.vprnn import Vprnn
 from surgsim.studies import STUDIES, load_study, vprnn
 from surgsim.studies.vprnn import comparison, network, starts
 from surgsim.studies.vprnn.cases import METHODS, NOMINAL, PAPER_SIZE, Level, scenario
 from surgsim.studies.vprnn.claims import paper_claims
 from surgsim.studies.vprnn.disturbances import GRID, OURS, ladder_row
+from surgsim.studies.vprnn.equations import Network
 from surgsim.studies.vprnn.euler import CELLS, arm_row, euler_row, limit_s
 from surgsim.studies.vprnn.own_claims import own_claims
 
@@ -175,7 +175,7 @@ def test_the_slowest_self_motion_mode_of_the_rnn_is_c2_over_epsilon(at):
 
 def test_the_cross_product_rows_make_w_singular(at):
     assert network.cross_form_rank(at) == (30, 31)
-    W, _ = Vprnn(at.vprnn).system(Vprnn(at.vprnn).terms(at.problem))
+    W = Network(at.vprnn, at.arm, at.problem).W
     assert np.linalg.matrix_rank(W) == len(W) == 30
 
 

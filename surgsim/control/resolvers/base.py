@@ -72,8 +72,7 @@ class KernelResolver:
         Raises:
             ControlFailure: If the kernel has no answer.
         """
-        seen = new_seen(self.arm, dt_s=problem.dt_s, has_trocar=problem.rcm is not None)
-        fill_velocity_problem(seen, problem)
+        seen = self.seen(problem)
         seen.first = memory is None
         after = np.zeros(self.memory_size) if memory is None else memory.copy()
         out = new(Resolved, seen.q.size)
@@ -82,6 +81,12 @@ class KernelResolver:
         if status != GOES_ON:
             raise self.failure(status, seen, after)
         return self._resolution(problem, out), after
+
+    def seen(self, problem: VelocityProblem) -> Any:
+        """What the kernel sees of a problem."""
+        seen = new_seen(self.arm, dt_s=problem.dt_s, has_trocar=problem.rcm is not None)
+        fill_velocity_problem(seen, problem)
+        return seen
 
     def failure(self, status: int, seen: Any, memory: Array) -> ControlFailure:
         """Why there is no answer."""

@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surgsim.control.failure import ControlFailure
-from surgsim.control.resolvers.vprnn import Vprnn
 from surgsim.studies.study import Row
 from surgsim.studies.vprnn.cases import METHODS, NOMINAL, errors, outcome, run_case
+from surgsim.studies.vprnn.equations import Network
 from surgsim.studies.vprnn.network import Instant
 
 Array = NDArray[np.float64]
@@ -30,25 +30,25 @@ def euler_deltas(at: Instant, beta: float, period_s: float) -> tuple[Array, Arra
 
     Ends where the network diverges.
     """
-    net = Vprnn(at.vprnn.model_copy(update={"integration": "euler", "beta": beta}))
-    W, l = net.system(net.terms(at.problem))  # noqa: E741 - the paper's name
+    config = at.vprnn.model_copy(update={"integration": "euler", "beta": beta})
+    net = Network(config, at.arm, at.problem)
+    W, l, resolver = net.W, net.l, net.resolver  # noqa: E741 - the paper's name
     first = max(0, round((limit_s(period_s, beta) - _BEFORE_S) / period_s))
     problem = replace(at.problem, t_s=first * period_s, dt_s=period_s)
-    memory, sizes = net.start(problem), [float(np.linalg.norm(l))]
+    memory, sizes = resolver.start(problem), [float(np.linalg.norm(l))]
     for k in range(first, first + round((_BEFORE_S + _AFTER_S) / period_s)):
         try:
-            _, memory = net.step(replace(problem, t_s=k * period_s), memory)
+            _, memory = resolver.step(replace(problem, t_s=k * period_s), memory)
         except ControlFailure:
             break
-        sizes.append(float(np.linalg.norm(W @ np.asarray(memory.z) - l)))
+        sizes.append(float(np.linalg.norm(W @ memory[: len(l)] - l)))
     return period_s * np.arange(first, first + len(sizes), dtype=float), np.array(sizes)
 
 
 def exact_deltas(at: Instant, beta: float, period_s: float, times: Array) -> Array:
     """|delta| of the closed form at the same times."""
-    net = Vprnn(at.vprnn.model_copy(update={"beta": beta}))
-    _, l = net.system(net.terms(at.problem))  # noqa: E741 - the paper's name
-    delta, sizes = -l, []
+    net = Network(at.vprnn.model_copy(update={"beta": beta}), at.arm, at.problem)
+    delta, sizes = -net.l, []
     for t in times:
         sizes.append(float(np.linalg.norm(delta)))
         delta = net.decay(delta, float(t), period_s)

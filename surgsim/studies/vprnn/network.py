@@ -12,12 +12,14 @@ from surgsim.control.manipulability import diamond, jacobian_gradient, log_manip
 from surgsim.control.null_space import least_velocity
 from surgsim.control.problem import VelocityProblem, stacked_rows, velocity_bounds
 from surgsim.control.rcm import rcm_kinematics
-from surgsim.control.resolvers.rnn import Rnn, RnnConfig, RnnMemory
-from surgsim.control.resolvers.vprnn import Vprnn, VprnnConfig
+from surgsim.control.resolvers.rnn import RnnConfig
+from surgsim.control.resolvers.vprnn import VprnnConfig
+from surgsim.models.arm import ArmModel
 from surgsim.scenario.load import load_controller
 from surgsim.simulate.setup import Setup, prepare
 from surgsim.studies.study import Row
 from surgsim.studies.vprnn.cases import METHODS, TABLE_I_RATIO, scenario
+from surgsim.studies.vprnn.equations import Network
 
 Array = NDArray[np.float64]
 
@@ -36,11 +38,13 @@ class Instant:
 
     Attributes:
         problem: The problem.
+        arm: The nominal arm.
         vprnn: Table I's VPRNN.
         rnn: Table I's RNN.
     """
 
     problem: VelocityProblem
+    arm: ArmModel
     vprnn: VprnnConfig
     rnn: RnnConfig
 
@@ -50,6 +54,7 @@ def instant(t_s: float = _AT_S) -> Instant:
     setup = prepare(scenario(METHODS["vprnn"]))
     return Instant(
         problem=_problem(setup, t_s),
+        arm=setup.arm,
         vprnn=load_controller("vprnn").resolver,
         rnn=load_controller("rnn").resolver,
     )
@@ -86,10 +91,9 @@ def optimum(problem: VelocityProblem, rate: float) -> Array:
 
 def random_delta(at: Instant, seed: int) -> Array:
     """delta(0) = W z(0) - l (30,) of a random z(0), each entry normal with deviation `Z_SPREAD`."""
-    net = Vprnn(at.vprnn)
-    W, l = net.system(net.terms(at.problem))  # noqa: E741 - the paper's name
-    z = Z_SPREAD * np.random.default_rng(seed).standard_normal(len(l))
-    return np.asarray(W @ z - l)
+    net = Network(at.vprnn, at.arm, at.problem)
+    z = Z_SPREAD * np.random.default_rng(seed).standard_normal(len(net.l))
+    return np.asarray(net.W @ z - net.l)
 
 
 def theorem_row(at: Instant, seed: int, bound: float | None) -> Row:
@@ -98,7 +102,7 @@ def theorem_row(at: Instant, seed: int, bound: float | None) -> Row:
     The closed form delta(0) exp(-beta (exp(t) - 1)) (linear activation only), Runge-Kutta integration of
     eq. (27), and Theorem 1's V' = -beta exp(t) delta^T phi(delta) against the difference of V over a step.
     """
-    net = Vprnn(at.vprnn.model_copy(update={"activation_bound": bound}))
+    net = Network(at.vprnn.model_copy(update={"activation_bound": bound}), at.arm, at.problem)
     beta, step, limit = at.vprnn.beta, 1e-5, math.inf if bound is None else bound
     delta = [random_delta(at, seed)]
     while np.linalg.norm(delta[-1]) > 1e-6 * np.linalg.norm(delta[0]):
@@ -141,30 +145,32 @@ def theorem_table(at: Instant, seeds: Iterable[int]) -> list[Row]:
 
 def vprnn_velocities(at: Instant, seed: int, steps: int) -> Array:
     """Joint velocity q' (steps + 1, 7) [rad/s] of the network from a random z(0), a row a control period."""
-    net = Vprnn(at.vprnn)
-    terms = net.terms(at.problem)
-    _, l = net.system(terms)  # noqa: E741 - the paper's name
+    net = Network(at.vprnn, at.arm, at.problem)
     delta, found = random_delta(at, seed), []
     for k in range(steps + 1):
-        found.append(net.recover_qdot(terms, l + delta))
+        found.append(net.velocity(delta))
         delta = net.decay(delta, k * PERIOD_S, PERIOD_S)
     return np.array(found)
 
 
 def rnn_velocities(at: Instant, seed: int, steps: int) -> Array:
     """Omega (steps + 1, 7) [rad/s] of Jin's network from random states, a row a control period."""
-    net, rng = Rnn(at.rnn), np.random.default_rng(seed)
-    rest = net.start(at.problem)
-    memory = RnnMemory(
-        omega=0.5 * rng.standard_normal(7),
-        phi=rest.phi + rng.standard_normal(9),
-        lam=rng.standard_normal(len(rest.lam)),
-        sigma=rng.standard_normal(9),
+    net, rng = at.rnn.build(at.arm), np.random.default_rng(seed)
+    n, rows = at.problem.q.size, 3 if at.problem.rcm is None else 5
+    A = at.problem.kin.Jv_WT @ at.problem.kin.Jv_WT.T
+    memory = np.concatenate(
+        [
+            0.5 * rng.standard_normal(n),
+            np.asarray(np.linalg.inv(A)).ravel() + rng.standard_normal(9),
+            np.zeros(9 + rows),
+        ]
     )
-    found = [memory.omega]
+    memory[n + 18 :] = rng.standard_normal(rows)
+    memory[n + 9 : n + 18] = rng.standard_normal(9)
+    found = [memory[:n]]
     for _ in range(steps):
         _, memory = net.step(at.problem, memory)
-        found.append(memory.omega)
+        found.append(memory[:n])
     return np.array(found)
 
 
@@ -208,7 +214,6 @@ def rnn_modes(at: Instant) -> Array:
 
 def cross_form_rank(at: Instant) -> tuple[int, int]:
     """Rank and size of W with the paper's three cross-product rows."""
-    net = Vprnn(at.vprnn.model_copy(update={"rcm_rows": "cross"}))
-    W, _ = net.system(net.terms(at.problem))
+    W = Network(at.vprnn.model_copy(update={"rcm_rows": "cross"}), at.arm, at.problem).W
     values = np.linalg.svd(W, compute_uv=False)
     return int(np.sum(values > 1e-10 * values[0])), len(W)

@@ -7,13 +7,14 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from surgsim.contract import problems
+from surgsim.control.failure import ControlFailure
 from surgsim.control.policies import registry
 from surgsim.control.policies.asking import Asker
 from surgsim.control.policies.observation import observe
 from surgsim.control.policies.registry import find_policy, offering, policy_names, register_policy
 from surgsim.control.policies.shipped import damping, proportional
-from surgsim.control.failure import ControlFailure
-from surgsim.control.resolvers.pinv import Pinv, PinvConfig
+from surgsim.control.resolvers.pinv import PinvConfig
 from surgsim.control.resolvers.policy import PolicyConfig
 from surgsim.control.torque_laws.policy import PolicyLawConfig
 from surgsim.errors import Outcome, SurgsimError
@@ -143,7 +144,7 @@ def test_an_action_must_have_its_shape_and_be_finite(velocity_problem):
 def test_a_tip_velocity_is_resolved_from_a_moving_reference(arm, velocity_problem):
     """Two steps of the resolver are two steps of the inner one with the command made by hand."""
     resolver = PolicyConfig().build(arm)
-    inner = Pinv(PinvConfig())
+    inner = PinvConfig().build(problems.arm())
     first = velocity_problem(2)
     v = proportional(observe(first))
     memory = resolver.start(first)

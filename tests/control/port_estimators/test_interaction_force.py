@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from surgsim.control.port_estimators.base import PortProblem
-from surgsim.control.port_estimators.interaction_force import InteractionForce, InteractionForceConfig
+from surgsim.control.port_estimators.interaction_force import InteractionForceConfig
 from surgsim.control.rcm import rcm_kinematics
 
 DT = 0.001
@@ -33,7 +33,7 @@ def problem(arm, velocity_problem):
 def _run(arm, problem, force_of, seconds, constant=None, **config):
     """Estimates while a lateral force (t, estimate) -> (2,) [N] acts on the shaft, which does not move."""
     rcm = rcm_kinematics(problem.kin, problem.p_WC, np.zeros(3))
-    estimator = InteractionForce(InteractionForceConfig(**config), arm)
+    estimator = InteractionForceConfig(**config).build(arm)
     memory, offset, out = estimator.start(problem), np.zeros(3), []
     extra = np.zeros(7) if constant is None else constant
     for k in range(round(seconds / DT)):
@@ -84,7 +84,7 @@ def test_harmonics_leave_no_force_at_the_breathing_rate(arm, problem, stiffness)
 def test_nothing_is_learnt_along_the_shaft(arm, problem):
     d = problem.kin.R_WT[:, 2]
     rcm = rcm_kinematics(problem.kin, problem.p_WC, np.zeros(3))
-    estimator = InteractionForce(InteractionForceConfig(tare_s=0.0), arm)
+    estimator = InteractionForceConfig(tare_s=0.0).build(arm)
     memory = estimator.start(problem)
     tau = problem.dyn.bias - np.array([1.0, 0.5]) @ rcm.jacobian
     for _ in range(100):

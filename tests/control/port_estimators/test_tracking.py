@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from surgsim.control.port_estimators.base import PortProblem
-from surgsim.control.port_estimators.tracking import Tracking, TrackingConfig
+from surgsim.control.port_estimators.tracking import TrackingConfig
 
 DT = 0.001
 
@@ -15,7 +15,7 @@ def follow(arm):
     kin = arm.kinematics(np.full(7, 0.3))
 
     def run(seen, dt=DT, **config):
-        tracking, memory, out = Tracking(TrackingConfig(**config)), None, []
+        tracking, memory, out = TrackingConfig(**config).build(arm), None, []
         for k, p_WC in enumerate(seen):
             problem = PortProblem(
                 t_s=k * dt,

@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from surgsim.control.resolvers.gradient import Gradient, GradientConfig
+from surgsim.contract import problems
+from surgsim.control.resolvers.gradient import GradientConfig
 
 seeds = pytest.mark.parametrize("seed", range(4))
 
@@ -15,7 +16,7 @@ def _unbounded(problem):
 
 
 def _answer(problem, **config):
-    resolver = Gradient(GradientConfig(**config))
+    resolver = GradientConfig(**config).build(problems.arm())
     return resolver.step(problem, resolver.start(problem))[0]
 
 

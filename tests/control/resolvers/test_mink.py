@@ -5,9 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from surgsim.contract import problems
 from surgsim.control.failure import ControlFailure
 from surgsim.control.resolvers.mink import Mink, MinkConfig
-from surgsim.control.resolvers.pinv import Pinv, PinvConfig
+from surgsim.control.resolvers.pinv import PinvConfig
 from surgsim.errors import Outcome
 from surgsim.simulate.loop import simulate
 
@@ -23,7 +24,7 @@ def _mink(arm, p, **config):
 @pytest.mark.parametrize("trocar", [True, False])
 def test_answer_is_that_of_the_pseudo_inverse(arm, velocity_problem, seed, trocar):
     p = velocity_problem(seed, trocar=trocar, speed=0.005)
-    pinv = Pinv(PinvConfig(k_tip=3.0, k_rcm=7.0))
+    pinv = PinvConfig(k_tip=3.0, k_rcm=7.0).build(problems.arm())
     expected = pinv.step(p, None)[0].qdot
     assert (np.abs(expected) < p.upper).all()
     answer = _mink(arm, p, k_tip=3.0, k_rcm=7.0)

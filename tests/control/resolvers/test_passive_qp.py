@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 
-from surgsim.control.planes import PlaneConfig
 from surgsim.control.failure import ControlFailure
+from surgsim.control.planes import PlaneConfig
 from surgsim.control.problem import braking_bounds
 from surgsim.control.resolvers.passive_qp import PassiveQp, PassiveQpConfig
 from surgsim.tasks.base import EnergyBudget

@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from surgsim.control.resolvers.pinv import Pinv, PinvConfig
+from surgsim.contract import problems
+from surgsim.control.resolvers.pinv import PinvConfig
 
 seeds = pytest.mark.parametrize("seed", range(4))
 
@@ -15,7 +16,7 @@ def _unbounded(problem):
 
 
 def _answer(problem, **config):
-    resolver = Pinv(PinvConfig(**config))
+    resolver = PinvConfig(**config).build(problems.arm())
     return resolver.step(problem, resolver.start(problem))[0]
 
 

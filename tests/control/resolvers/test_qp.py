@@ -8,11 +8,12 @@ import pytest
 from pydantic import ValidationError
 from scipy.optimize import lsq_linear
 
-from surgsim.control.planes import PlaneConfig
+from surgsim.contract import problems
 from surgsim.control.failure import ControlFailure
+from surgsim.control.planes import PlaneConfig
 from surgsim.control.qp import SHIPPED
 from surgsim.control.resolvers.qp import Qp, QpConfig
-from surgsim.control.resolvers.vprnn import Vprnn, VprnnConfig
+from surgsim.control.resolvers.vprnn import VprnnConfig
 from surgsim.errors import Outcome
 from surgsim.runs.folder import run_to_folder
 from surgsim.simulate.loop import simulate
@@ -53,7 +54,7 @@ def test_qp_and_vprnn_agree_where_no_bound_is_active(velocity_problem, seed, tro
         k_tip=vprnn.k1,
         k_rcm=vprnn.k2,
     )
-    network = Vprnn(vprnn)
+    network = vprnn.build(problems.arm())
     expected = network.step(p, network.start(p))[0].qdot
     assert (expected > p.lower).all()
     assert (expected < p.upper).all()

@@ -10,10 +10,12 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 from scipy.linalg import null_space
 
-from surgsim.control.manipulability import jacobian_gradient
+from surgsim.contract import problems
 from surgsim.control.failure import ControlFailure
+from surgsim.control.manipulability import jacobian_gradient
 from surgsim.control.rcm import rcm_cross_form
-from surgsim.control.resolvers.vprnn import Vprnn, VprnnConfig, VprnnMemory
+from surgsim.control.resolvers.vprnn import VprnnConfig
+from surgsim.studies.vprnn.equations import Network, decayed
 
 LATE = 10.0  # beta exp(10) of a period of 1 ms: nothing is left of delta
 TABLE_1 = {"h0": 0.1, "h1": 10.0, "h2": 50.0, "h3": 30.0, "h4": 30.0, "k1": 5.0, "k2": 5.0, "beta": 1e3}
@@ -85,8 +87,13 @@ def _optimum(p):
 
 
 def _step(config, p, memory=None):
-    network = Vprnn(config)
+    network = config.build(problems.arm())
     return network.step(p, network.start(p) if memory is None else memory)
+
+
+def _memory(network, delta):
+    """The network's memory after a step that left `delta`."""
+    return np.concatenate([delta, np.zeros(network.memory_size - len(delta))])
 
 
 def test_default_gains_are_those_of_table_1():
@@ -97,9 +104,9 @@ def test_default_gains_are_those_of_table_1():
 @seeds
 @pytest.mark.parametrize("rows", ["normal", "cross"])
 def test_system_is_eq_25(problem, rows):
-    network = Vprnn(VprnnConfig(rcm_rows=rows))
+    network = Network(VprnnConfig(rcm_rows=rows), problems.arm(), problem)
     for built, literal in zip(
-        network.system(network.terms(problem)), _literal_system(problem, cross=rows == "cross"), strict=True
+        (network.W, network.l), _literal_system(problem, cross=rows == "cross"), strict=True
     ):
         np.testing.assert_allclose(built, literal, atol=1e-12)
 
@@ -120,7 +127,7 @@ def test_with_cross_rows_the_paper_s_w_is_singular_everywhere(velocity_problem, 
 def test_converged_network_gives_the_optimum_of_eq_22(problem):
     p = replace(problem, t_s=LATE)
     answer, memory = _step(VprnnConfig(), p)
-    np.testing.assert_array_equal(memory.delta, 0.0)
+    np.testing.assert_array_equal(memory, 0.0)
     np.testing.assert_allclose(answer.qdot, _optimum(p), atol=1e-10)
     assert answer.residual < 1e-10
 
@@ -153,9 +160,11 @@ def test_block_solve_equals_a_dense_solve_of_the_whole_system(velocity_problem, 
     p = _unbounded(velocity_problem(seed, trocar=trocar, t_s=0.3))
     W, l = _literal_system(p)  # noqa: E741
     delta = np.random.default_rng(seed).standard_normal(len(l))
-    answer, memory = _step(VprnnConfig(), p, VprnnMemory(delta=delta))
-    np.testing.assert_allclose(answer.qdot, np.linalg.solve(W, l + memory.delta)[:7], atol=1e-8)
-    assert 0.0 < np.linalg.norm(memory.delta) < 0.5 * np.linalg.norm(delta)
+    network = VprnnConfig().build(problems.arm())
+    answer, memory = network.step(p, _memory(network, delta))
+    after = memory[: len(delta)]
+    np.testing.assert_allclose(answer.qdot, np.linalg.solve(W, l + after)[:7], atol=1e-8)
+    assert 0.0 < np.linalg.norm(after) < 0.5 * np.linalg.norm(delta)
 
 
 @seeds
@@ -182,7 +191,7 @@ def _integrated(delta, start, period, beta, cap, bound):
 def test_step_of_delta_is_the_solution_of_eq_27(bound, start, cap):
     config = VprnnConfig(beta=1.3, exponent_cap=cap, activation_bound=bound)
     delta = np.array([-4.0, -0.31, -0.2, 0.0, 1e-3, 0.29, 0.9, 2.0])
-    stepped = Vprnn(config).decay(delta, start, 0.6)
+    stepped = decayed(config.build(problems.arm()).gains, delta, start, 0.6)
     np.testing.assert_allclose(stepped, _integrated(delta, start, 0.6, 1.3, cap, bound), atol=2e-6)
 
 
@@ -192,9 +201,10 @@ def test_step_of_delta_is_the_solution_of_eq_27(bound, start, cap):
     st.one_of(st.none(), st.floats(0.01, 10.0)),
 )
 def test_two_half_steps_of_delta_equal_a_whole_one(delta, start, bound):
-    network = Vprnn(VprnnConfig(beta=2.0, exponent_cap=3.0, activation_bound=bound))
-    halves = network.decay(network.decay(np.array(delta), start, 0.01), start + 0.01, 0.01)
-    whole = network.decay(np.array(delta), start, 0.02)
+    config = VprnnConfig(beta=2.0, exponent_cap=3.0, activation_bound=bound)
+    gains = config.build(problems.arm()).gains
+    halves = decayed(gains, decayed(gains, np.array(delta), start, 0.01), start + 0.01, 0.01)
+    whole = decayed(gains, np.array(delta), start, 0.02)
     np.testing.assert_allclose(halves, whole, rtol=1e-6, atol=1e-9)
     assert (np.abs(whole) <= np.abs(delta)).all()
     assert (whole * np.array(delta) >= 0.0).all()
@@ -202,7 +212,7 @@ def test_two_half_steps_of_delta_equal_a_whole_one(delta, start, bound):
 
 def _run(config, p, start_s, steps):
     """The answers of `steps` periods on a constant problem, from z = 0."""
-    network = Vprnn(config)
+    network = config.build(problems.arm())
     memory, answers = network.start(p), []
     for k in range(steps):
         answer, memory = network.step(replace(p, t_s=start_s + k * p.dt_s), memory)
@@ -243,9 +253,10 @@ def test_literal_euler_is_stable_only_until_the_gain_times_the_period_is_two(pro
 @pytest.mark.parametrize("bound", [None, 0.1])
 def test_a_run_of_a_million_seconds_does_not_overflow(problem, cap, bound):
     config = VprnnConfig(exponent_cap=cap, activation_bound=bound)
-    answer, memory = _step(config, replace(problem, t_s=1e6), VprnnMemory(delta=np.ones(30)))
+    network = config.build(problems.arm())
+    answer, memory = network.step(replace(problem, t_s=1e6), _memory(network, np.ones(30)))
     np.testing.assert_allclose(answer.qdot, _optimum(problem), atol=1e-9)
-    np.testing.assert_allclose(memory.delta, 0.0, atol=1e-9)
+    np.testing.assert_allclose(memory, 0.0, atol=1e-9)
 
 
 @given(

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from surgsim.contract import problems
 from surgsim.control.rcm import rcm_kinematics
 from surgsim.control.torque_laws.hierarchical_impedance import (
-    HierarchicalImpedance,
     HierarchicalImpedanceConfig,
 )
 
@@ -24,7 +24,7 @@ def problem(torque_problem, seed, trocar):
 
 
 def _torque(problem, config=UNEQUAL):
-    law = HierarchicalImpedance(config)
+    law = config.build(problems.arm())
     return law.torque(problem, law.start(problem))[0]
 
 
@@ -62,7 +62,7 @@ def test_default_gains_are_those_of_table_1():
 @cases
 def test_terms_are_those_of_the_formula(problem):
     np.testing.assert_allclose(_torque(problem), _literal(problem, UNEQUAL), atol=1e-9)
-    assert HierarchicalImpedance(UNEQUAL).terms == ("tip", "rcm", "joint", "bias")
+    assert UNEQUAL.build(problems.arm()).terms == ("tip", "rcm", "joint", "bias")
 
 
 @cases

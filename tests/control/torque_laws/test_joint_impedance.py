@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from surgsim.control.torque_laws.joint_impedance import JointImpedance, JointImpedanceConfig
+from surgsim.contract import problems
+from surgsim.control.torque_laws.joint_impedance import JointImpedanceConfig
 from surgsim.errors import Outcome
 from surgsim.simulate.loop import simulate
 
@@ -16,7 +17,7 @@ D = (1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0)
 @pytest.mark.parametrize(("seed", "trocar"), [(0, True), (1, False)])
 def test_terms_are_those_of_the_formula(torque_problem, seed, trocar):
     p = torque_problem(seed, trocar=trocar)
-    law = JointImpedance(JointImpedanceConfig(stiffness_nm_per_rad=K, damping_nm_s_per_rad=D))
+    law = JointImpedanceConfig(stiffness_nm_per_rad=K, damping_nm_s_per_rad=D).build(problems.arm())
     terms, _ = law.torque(p, law.start(p))
     spring = np.diag(K) @ (p.q_ref - p.q)
     damper = np.diag(D) @ (p.resolution.qdot - p.v)
@@ -26,7 +27,7 @@ def test_terms_are_those_of_the_formula(torque_problem, seed, trocar):
 
 def test_neither_tip_nor_trocar_matter(torque_problem):
     p = torque_problem(0)
-    law = JointImpedance(JointImpedanceConfig())
+    law = JointImpedanceConfig().build(problems.arm())
     other = replace(p, rcm=None, command=replace(p.command, p_WTd=p.command.p_WTd + 1.0))
     np.testing.assert_array_equal(law.torque(p, None)[0], law.torque(other, None)[0])
 

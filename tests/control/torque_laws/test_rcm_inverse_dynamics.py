@@ -2,17 +2,16 @@
 
 from dataclasses import replace
 
-import mujoco
 import numpy as np
 import pytest
 
-from surgsim.control.observer import DelayEstimate, ObserverState
+from surgsim.control.observer import delay_size, observer_size
 from surgsim.control.rcm import rcm_kinematics
 from surgsim.control.torque_laws.rcm_inverse_dynamics import (
-    InverseDynamicsMemory,
-    RcmInverseDynamics,
     RcmInverseDynamicsConfig,
-    predict,
+)
+from surgsim.control.torque_laws.rcm_inverse_dynamics import (
+    predict as predict_in_place,
 )
 from surgsim.errors import Outcome
 from surgsim.models.build import build
@@ -38,11 +37,32 @@ def problem(torque_problem, seed, trocar):
     return torque_problem(seed, trocar=trocar)
 
 
-def _memory(d=None, delay=None):
-    return InverseDynamicsMemory(
-        observer=ObserverState(disturbance=np.zeros(7) if d is None else d),
-        delay=DelayEstimate.start(20) if delay is None else delay,
-    )
+KNOWN = SOFT.model_copy(update={"observer_gain": 0.0})  # what the observer knows stays as it is
+MOST = 20
+
+
+def _memory(d=None, commands=None):
+    """What the law remembers: a disturbance (7,), and torques commanded, newest first (n, 7)."""
+    memory = np.zeros(observer_size(7) + delay_size(7, MOST))
+    memory[:7] = 0.0 if d is None else d
+    sent = memory[observer_size(7) :][: 7 * (MOST + 1)].reshape(MOST + 1, 7)
+    sent[:] = np.nan
+    if commands is not None:
+        sent[:] = commands[: MOST + 1]
+    return memory
+
+
+def _commands(memory):
+    """The torques that a memory holds, newest first (n, 7)."""
+    return memory[observer_size(7) :][: 7 * (MOST + 1)].reshape(MOST + 1, 7)
+
+
+def predict(p, in_flight, d, damping):
+    """State after the torques `in_flight` (n, 7), oldest first."""
+    q, v, newest_first = p.q.copy(), p.v.copy(), np.ascontiguousarray(in_flight[::-1]).ravel()
+    M, bias, ticks = p.dyn.mass_matrix, p.dyn.bias, len(in_flight)
+    assert predict_in_place(q, v, M, bias, d, damping, newest_first, ticks, p.dt_s)
+    return q, v
 
 
 def _second_derivatives(arm, p, h=1e-4):
@@ -88,7 +108,7 @@ def test_the_terms_sum_to_the_inverse_dynamics_of_the_constrained_acceleration(a
     solution = np.linalg.solve(K, np.concatenate([M @ posture, a]))
     qddot, force = solution[:7], solution[7:]
     np.testing.assert_allclose(J @ qddot, a, atol=1e-8)
-    terms, _ = RcmInverseDynamics(SOFT, arm).torque(p, _memory(d))
+    terms, _ = KNOWN.build(arm).torque(p, _memory(d))
     expected = np.zeros((6, 7))
     expected[0], expected[1] = J[:3].T @ force[:3], J[3:].T @ force[3:]
     expected[2] = M @ posture
@@ -100,15 +120,15 @@ def test_the_terms_sum_to_the_inverse_dynamics_of_the_constrained_acceleration(a
 
 
 def test_its_terms_are_named(arm):
-    assert RcmInverseDynamics(SOFT, arm).terms == TERMS
+    assert SOFT.build(arm).terms == TERMS
 
 
 @cases
 def test_under_a_limit_the_sum_keeps_it_and_the_limits_term_is_what_gave_way(arm, problem):
     p = replace(problem, command=replace(problem.command, a_WTd=np.array([300.0, 200.0, -300.0])))
-    free, _ = RcmInverseDynamics(SOFT, arm).torque(problem, _memory())
+    free, _ = SOFT.build(arm).torque(problem, None)
     np.testing.assert_array_equal(free[TERMS.index("limits")], 0.0)
-    terms, _ = RcmInverseDynamics(SOFT, arm).torque(p, _memory())
+    terms, _ = SOFT.build(arm).torque(p, None)
     limits = terms[TERMS.index("limits")]
     assert np.abs(limits).max() > 1.0
     assert (np.abs(terms.sum(axis=0)) <= arm.limits.torque).all()
@@ -124,9 +144,7 @@ def _stepped(arm, p, torques):
     scene = build(SceneConfig(robot=RobotConfig(name="lwr4plus"), theatre=False))
     plant = DynamicPlantConfig().build(scene, p.dt_s, (), np.random.SeedSequence(0))
     plant.reset(p.q)
-    plant._qvel[:] = p.v
-
-    mujoco.mj_step1(scene.model, plant._data)
+    plant.set_velocity(p.v)
     for torque in torques:
         state = plant.step(torque, np.zeros(7))
     return state.q, state.v
@@ -159,12 +177,10 @@ def test_with_a_delay_it_acts_on_the_state_when_the_torque_will_act(arm, problem
     """The same as without a delay there and then: state, command, reference and trocar three ticks on."""
     p, ticks = problem, 3
     rng = np.random.default_rng(0)
-    delay = DelayEstimate.start(20)
-    for _ in range(25):
-        delay = delay.sent(p.dyn.bias + rng.uniform(-3.0, 3.0, 7))
-    p = replace(p, tau_measured=delay.commands[ticks])
-    late, _ = RcmInverseDynamics(SOFT, arm).torque(p, _memory(delay=delay))
-    q, v = predict(p, delay.commands[:ticks][::-1], np.zeros(7), arm.damping)
+    commands = p.dyn.bias + rng.uniform(-3.0, 3.0, (25, 7))
+    p = replace(p, tau_measured=commands[ticks])
+    late, _ = KNOWN.build(arm).torque(p, _memory(commands=commands))
+    q, v = predict(p, commands[:ticks][::-1], np.zeros(7), arm.damping)
     kin, dyn = arm.evaluate(q, v)
     dt, c = ticks * p.dt_s, p.command
     p_WC = p.p_WC + dt * p.v_WC
@@ -181,21 +197,21 @@ def test_with_a_delay_it_acts_on_the_state_when_the_torque_will_act(arm, problem
         ),
         q_ref=p.q_ref + dt * p.resolution.qdot,
     )
-    there, _ = RcmInverseDynamics(SOFT, arm).torque(ahead, _memory())
+    there, _ = SOFT.build(arm).torque(ahead, None)
     # the command is extrapolated with T^2 / 2 of its acceleration
     np.testing.assert_allclose(late, there, atol=1e-6)
-    now, _ = RcmInverseDynamics(SOFT, arm).torque(p, _memory())
+    now, _ = SOFT.build(arm).torque(p, None)
     assert np.abs(late - now).max() > 1e-2
 
 
 @cases
 def test_it_remembers_what_it_sent(arm, problem):
-    law = RcmInverseDynamics(RcmInverseDynamicsConfig(), arm)
-    terms, memory = law.torque(problem, _memory())
-    np.testing.assert_allclose(memory.delay.commands[0], terms.sum(axis=0), atol=1e-12)
-    assert (np.abs(memory.delay.commands[0]) <= arm.limits.torque).all()
+    law = RcmInverseDynamicsConfig().build(arm)
+    terms, memory = law.torque(problem, None)
+    np.testing.assert_allclose(_commands(memory)[0], terms.sum(axis=0), atol=1e-12)
+    assert (np.abs(_commands(memory)[0]) <= arm.limits.torque).all()
     _, later = law.torque(problem, memory)
-    np.testing.assert_array_equal(later.delay.commands[1], memory.delay.commands[0])
+    np.testing.assert_array_equal(_commands(later)[1], _commands(memory)[0])
 
 
 # Whole runs: a circle of 1 cm in two seconds.

@@ -46,9 +46,7 @@ def test_a_moving_joint_loses_the_dry_friction_torque(arm, disturbed, q):
     def slow_down(coulomb):
         plant = disturbed.plant_of(JointFrictionConfig(coulomb_nm=coulomb))
         plant.reset(q)
-        plant._qvel[:] = 0.5
-        mujoco.mj_step1(plant._scene.model, plant._data)
-        state = plant._state()
+        state = plant.set_velocity(np.full(7, 0.5))
         v0, M = state.v, arm.dynamics(q, state.v).mass_matrix
         for _ in range(5):
             state = plant.step(arm.dynamics(state.q, state.v).bias + arm.damping * state.v, np.zeros(7))
@@ -108,8 +106,7 @@ def _sliding(disturbed, q, config, speed):
     """Joint velocities one step after `speed`."""
     plant = disturbed.plant_of(config)
     plant.reset(q)
-    plant._qvel[:] = speed
-    mujoco.mj_step1(plant._scene.model, plant._data)
+    plant.set_velocity(speed)
     plant.step(np.zeros(7), np.zeros(7))
     return plant._data.qvel.copy()
 
@@ -139,7 +136,8 @@ def test_friction_takes_energy_out(arm, disturbed, q):
     for k in range(1500):
         drive = 1.2 * np.sin(2.0 * np.pi * 2.0 * k * disturbed.DT + np.arange(7))
         mujoco.mj_step1(plant._scene.model, data)
-        plant._parts.push(k * disturbed.DT, plant._scene, data)
+        for part in plant.parts:
+            part.push(k * disturbed.DT, plant._scene, data)
         data.ctrl[:] = arm.dynamics(state.q, state.v).bias + drive
         bound = data.efc_frictionloss.copy()
         assert len(bound) == 7
@@ -149,7 +147,7 @@ def test_friction_takes_energy_out(arm, disturbed, q):
         power.append(force * v)
         slips += (np.abs(v) > 0.01).sum()
         sticks += (np.abs(v) < 1e-4).sum()
-        state = plant._state()
+        state = plant.see()
     power = np.array(power)
     assert slips > 1000
     assert sticks > 1000

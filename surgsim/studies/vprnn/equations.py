@@ -1,0 +1,70 @@
+"""The VPRNN's matrices of one instant, from the kernels of the resolver itself."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from surgsim.control.manipulability import diamond, jacobian_gradient
+from surgsim.control.problem import VelocityProblem
+from surgsim.control.resolvers.vprnn import (
+    BETA,
+    BOUND,
+    CAP,
+    VprnnConfig,
+    decay,
+    exponential_integral,
+    network_rows,
+    recover_qdot,
+    right_side,
+    system,
+)
+from surgsim.models.arm import ArmModel
+
+Array = NDArray[np.float64]
+
+
+class Network:
+    """W z = l of eq. (25) for a problem that stands still.
+
+    Args:
+        config: Gains.
+        arm: The nominal arm.
+        problem: The problem.
+
+    Attributes:
+        W: (n + 18 + m) square, for z = [q', psi, lambda1, lambda2, lambda3].
+        l: (n + 18 + m,).
+    """
+
+    def __init__(self, config: VprnnConfig, arm: ArmModel, problem: VelocityProblem) -> None:
+        self.resolver = config.build(arm)
+        seen, self._gains = self.resolver.seen(problem), self.resolver.gains
+        self._J, v = network_rows(self._gains, seen)
+        Jv = problem.kin.Jv_WT
+        self._A = np.ascontiguousarray(Jv @ Jv.T)
+        self._D = diamond(Jv, jacobian_gradient(Jv, problem.kin.z_W))
+        self.W: Array = system(self._gains, self._J, self._A, self._D)
+        self.l: Array = np.zeros(len(self.W))
+        right_side(self._gains, self._J, v, self._A, self.l)
+
+    def decay(self, delta: Array, t_s: float, dt_s: float) -> Array:
+        """The error delta after one period, eq. (27) in closed form."""
+        return decayed(self._gains, delta, t_s, dt_s)
+
+    def velocity(self, delta: Array) -> Array:
+        """Joint velocity q' (n,) of W z = l + delta.
+
+        Raises:
+            numpy.linalg.LinAlgError: If W is singular.
+        """
+        qdot = np.zeros(self._J.shape[1])
+        if not recover_qdot(self._gains, self._J, self._A, self._D, self.l + delta, qdot):
+            raise np.linalg.LinAlgError("W is singular")
+        return qdot
+
+
+def decayed(gains: Array, delta: Array, t_s: float, dt_s: float) -> Array:
+    """The error delta after one period from `t_s` [s], with a VPRNN's `gains`."""
+    out = np.array(delta, dtype=float)
+    progress = gains[BETA] * exponential_integral(float(t_s), float(t_s + dt_s), gains[CAP])
+    decay(out, progress, gains[BOUND])
+    return out
