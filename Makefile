@@ -4,6 +4,7 @@ ROOT := $(patsubst %/,%,$(dir $(abspath $(lastword $(MAKEFILE_LIST)))))
 VENV := $(ROOT)/.venv
 PY := $(VENV)/bin/python
 PYTHON ?= $(shell command -v python3.11 || command -v python3)
+EXTRAS := dev,gymnasium,pandas,ray
 RUN := runs/circle_lwr4plus/vprnn-seed0
 
 # What is installed follows from these; a stamp named after them says that pip has nothing to do.
@@ -80,7 +81,7 @@ $(INSTALLED_DEV): | $(PY)
 	@touch '$(INSTALLED)' '$(INSTALLED_DEV)'
 
 $(INSTALLED_ALL): | $(PY)
-	$(call install,$(ROOT)[dev,gymnasium,pandas,ray])
+	$(call install,$(ROOT)[$(EXTRAS)])
 	@touch '$(INSTALLED)' '$(INSTALLED_DEV)' '$(INSTALLED_ALL)'
 
 $(PY):

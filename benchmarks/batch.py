@@ -100,7 +100,7 @@ class Measured:
 
     def _report(self, done: int, count: int, outcome: str) -> None:
         self._last = time.perf_counter()
-        self.memory_mb.append(int(Path("/proc/self/statm").read_text().split()[1]) * _PAGE_MB)
+        self.memory_mb.append(int(Path("/proc/self/statm").read_text(encoding="utf-8").split()[1]) * _PAGE_MB)
         if done == self._workers:
             self._first = self._last
 

@@ -6,6 +6,7 @@ input is wrong; 128 and the signal's number if one ended the command (Ctrl-C 130
 
 import argparse
 import importlib
+import io
 import os
 import sys
 from collections.abc import Sequence
@@ -75,6 +76,7 @@ def print_error(error: SurgsimError) -> None:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command and return its exit status."""
+    _replace_what_cannot_be_shown()
     try:
         with stopping_in_order(), compiling_shown():
             options = build_parser().parse_args(arguments)
@@ -88,3 +90,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
+
+
+def _replace_what_cannot_be_shown() -> None:
+    """Let a terminal that does not know a letter show a question mark, rather than end the command."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="replace")

@@ -71,7 +71,9 @@ def _check_target(folder: Path) -> None:
 
 
 def _say(line: str) -> None:
-    print(line, file=sys.stderr, flush=True)
+    from surgsim.cli.table import print_prose
+
+    print_prose(line, sys.stderr)
 
 
 def _print_json(study: str, result: "StudyResult") -> None:
@@ -84,7 +86,7 @@ def _print_json(study: str, result: "StudyResult") -> None:
 
 
 def _print(study: str, result: "StudyResult") -> None:
-    from surgsim.cli.table import print_table
+    from surgsim.cli.table import print_beside, print_table
     from surgsim.studies.study import format_cell
 
     name, rows = next(iter(result.tables.items()))
@@ -94,4 +96,4 @@ def _print(study: str, result: "StudyResult") -> None:
     print_table(f"{study}: {name}", [key.replace("_", " ") for key in header], cells, right=numeric)
     print()
     for claim in result.claims:
-        print(f"{claim.verdict:14} {claim.text} ({claim.source})\n{'':14} {claim.evidence}")
+        print_beside(f"{claim.verdict:14} ", f"{claim.text} ({claim.source})", claim.evidence)

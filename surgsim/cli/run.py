@@ -62,12 +62,26 @@ def execute(options: argparse.Namespace) -> int:
             raise naming_file(options.scenario, error) from error
     ending = result.trace.meta.ending
     if options.json:
-        print((folder / "metrics.json").read_text(), end="")
+        print(_stored(folder / "metrics.json"), end="")
     else:
         print_run(result.trace, result.metrics)
     speed = f"{result.wall_time_s:.1f} s, {result.real_time_factor:.1f}x real time"
     print_prose(f"simulated {ending.t_s:.1f} s in {speed}; wrote {folder}", sys.stderr)
     return 0 if ending.outcome is Outcome.COMPLETED else 1
+
+
+def _stored(file: Path) -> str:
+    """The text of a file that was just written.
+
+    Raises:
+        SurgsimError: If the disk does not give it back.
+    """
+    from surgsim.errors import SurgsimError
+
+    try:
+        return file.read_text(encoding="utf-8")
+    except OSError as error:
+        raise SurgsimError(f"{file}: written, but cannot be read: {error.strerror or error}") from error
 
 
 def _default_folder(parent: Path, name: str, operator: str | None) -> Path:

@@ -54,7 +54,16 @@ def print_prose(text: str, file: TextIO | None = None) -> None:
     """Print a sentence: broken between words on a terminal, on one line elsewhere."""
     file = file or sys.stdout
     lines = fit_prose(text, terminal_width(file)) if file.isatty() else [text]
-    print("\n".join(lines), file=file)
+    print("\n".join(lines), file=file, flush=True)
+
+
+def print_beside(head: str, *texts: str) -> None:
+    """Print sentences below each other, to the right of `head`; broken between words on a terminal."""
+    room = terminal_width(sys.stdout) - _len(head)
+    for text in texts:
+        for line in fit_prose(text, room) if sys.stdout.isatty() else [text]:
+            print(head + line)
+            head = " " * _len(head)
 
 
 def print_text(text: str) -> None:

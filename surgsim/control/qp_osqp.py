@@ -13,13 +13,13 @@ Array = NDArray[np.float64]
 _SETTINGS = {
     "verbose": False,
     "scaling": 0,  # the program is handed over well scaled
-    "adaptive_rho_interval": 25,  # iterations, never time: the same program gives the same bits
+    "adaptive_rho_interval": 1000,  # iterations, never time: the same program gives the same bits
     "check_termination": 5,
     "eps_abs": 1e-10,
     "eps_rel": 1e-10,
     "eps_prim_inf": 1e-9,
     "eps_dual_inf": 1e-9,
-    "max_iter": 20_000,
+    "max_iter": 100_000,
     "polishing": False,  # it prints to standard output where no row is active
 }
 _TINY = 1e-9

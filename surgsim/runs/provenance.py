@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import surgsim
-from surgsim.runs.plugins import plugins_of, policies_of
+from surgsim.runs.parts import plugins_of, policies_of
 from surgsim.runs.sources import LATER_ROOMS, ROOT, sources_sha256
 from surgsim.scenario.schema import Scenario
 

@@ -41,7 +41,7 @@ def test_the_import_loads_nothing_but_the_standard_library():
 
 
 def test_type_checkers_and_the_interpreter_are_told_the_same_names():
-    tree = ast.parse(Path(surgsim.__file__).read_text())
+    tree = ast.parse(Path(surgsim.__file__).read_text(encoding="utf-8"))
     block = next(node for node in tree.body if isinstance(node, ast.If))
     told = {alias.name: node.module for node in block.body for alias in node.names}
     assert sorted(told) == sorted(surgsim.__all__)

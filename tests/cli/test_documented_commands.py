@@ -44,6 +44,7 @@ FEW = f"{SHORT} --controllers vprnn,pinv --seeds 0:1"
 SHORTER = {
     "surgsim compare quick --out runs/quick": FEW,
     "surgsim compare quick --out runs/quick --resume": FEW,
+    "surgsim compare quick --matters rcm_error_rms_mm=0.5 --out runs/half_mm": FEW,
     "surgsim compare circle_lwr4plus --controllers vprnn,joint_impedance --seeds 0:2 --out runs/two": SHORT,
     "surgsim compare circle_lwr4plus spiral_lwr4plus --controllers vprnn,rcm_inverse_dynamics --seeds 0:5": (
         f"{SHORT} --seeds 0:1"

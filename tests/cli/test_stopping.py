@@ -104,7 +104,11 @@ def test_a_batch_that_is_ended_is_gone_on_with(surgsim, tmp_path, how):
     command = ["compare", "tiny.yaml", "--out", "out", "--jobs", "2"]
     typed = surgsim(*command)
     typed.wait(until=lambda: any(whole_runs(tmp_path)))
-    children = Path(f"/proc/{typed.process.pid}/task/{typed.process.pid}/children").read_text().split()
+    children = (
+        Path(f"/proc/{typed.process.pid}/task/{typed.process.pid}/children")
+        .read_text(encoding="utf-8")
+        .split()
+    )
     if how == "Ctrl-C":
         typed.press(b"\x03")
     elif how == "SIGTERM":
@@ -138,7 +142,7 @@ def whole_runs(folder):
 
 def alive(pid):
     try:
-        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+        return Path(f"/proc/{pid}/stat").read_text(encoding="utf-8").rpartition(")")[2].split()[0] != "Z"
     except OSError:
         return False
 

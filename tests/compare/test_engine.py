@@ -437,7 +437,7 @@ def wait_for(condition, seconds=90.0):
 
 def alive(pid):
     try:
-        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+        return Path(f"/proc/{pid}/stat").read_text(encoding="utf-8").rpartition(")")[2].split()[0] != "Z"
     except OSError:
         return False
 
@@ -451,7 +451,7 @@ def test_kill_9_of_the_whole_command_at_a_random_moment(whole, tmp_path):
     with command:
         wait_for(lambda: len(list(out.glob("runs/*/*/*/metrics.json"))) >= runs)
         time.sleep(delay_s)
-        family = Path(f"/proc/{command.pid}/task/{command.pid}/children").read_text().split()
+        family = Path(f"/proc/{command.pid}/task/{command.pid}/children").read_text(encoding="utf-8").split()
         command.kill()
     wait_for(lambda: not any(alive(pid) for pid in family), 30.0)
     print(f"killed with {runs} runs whole, {delay_s:.3f} s later")

@@ -158,16 +158,16 @@ def _edited(**changes: Any) -> Callable[[Path], None]:
 
     def spoil(path: Path) -> None:
         content = read_sealed(path)
-        path.write_text(json.dumps(sealed({**content, **changes})))
+        path.write_text(json.dumps(sealed({**content, **changes})), encoding="utf-8")
 
     return spoil
 
 
 def _text(old: str, new: str) -> Callable[[Path], None]:
     def spoil(path: Path) -> None:
-        text = path.read_text()
+        text = path.read_text(encoding="utf-8")
         assert old in text
-        path.write_text(text.replace(old, new, 1))
+        path.write_text(text.replace(old, new, 1), encoding="utf-8")
 
     return spoil
 

@@ -40,14 +40,14 @@ BYTES = {
 
 def test_the_good_one_is_good(tmp_path, monkeypatch) -> None:
     monkeypatch.chdir(tmp_path)
-    Path("good.yaml").write_text(GOOD)
+    Path("good.yaml").write_text(GOOD, encoding="utf-8")
     assert main(["check", "good.yaml", "--quiet"]) == 0
     assert len(FILES) >= 100
 
 
 @pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)
 def test_handmade(path: Path, refused) -> None:
-    text = path.read_text()
+    text = path.read_text(encoding="utf-8")
     said = text.splitlines()[-1]
     assert said.startswith(MARK)
     line = refused("check", path)
@@ -139,7 +139,7 @@ def test_paths_that_are_no_scenario(name: str, refused) -> None:
 def test_every_file_of_several_is_named(monkeypatch, tmp_path, capfd) -> None:
     monkeypatch.chdir(tmp_path)
     for name in ("a", "b"):
-        Path(f"{name}.yaml").write_text(GOOD.replace("0.2]", "9.0]"))
+        Path(f"{name}.yaml").write_text(GOOD.replace("0.2]", "9.0]"), encoding="utf-8")
     assert main(["check", "a.yaml", "b.yaml"]) == 2
     lines = capfd.readouterr().err.splitlines()
     assert [line.split(" ")[1] for line in lines] == ["a.yaml:", "b.yaml:"]

@@ -9,7 +9,8 @@ import pytest
 
 import surgsim
 from surgsim.control.policies.registry import offering
-from surgsim.runs import plugins, sources
+from surgsim.plugins import all_offers
+from surgsim.runs import parts, sources
 from surgsim.runs.provenance import code_difference, provenance_of
 
 ROOT = Path(surgsim.__file__).parents[1]
@@ -71,10 +72,12 @@ def policy_package(tmp_path, monkeypatch):
         "[surgsim.policies]\nmine = some_policies.mine:act\n", encoding="utf-8"
     )
     monkeypatch.syspath_prepend(tmp_path)
+    all_offers.cache_clear()
     yield folder
+    all_offers.cache_clear()
     for name in [name for name in sys.modules if name.partition(".")[0] == "some_policies"]:
         del sys.modules[name]
-    plugins._told.cache_clear()
+    parts._told.cache_clear()
 
 
 def test_a_package_that_gave_a_part_is_told_with_version_and_hash_and_a_policy_with_its_file(
@@ -85,7 +88,7 @@ def test_a_package_that_gave_a_part_is_told_with_version_and_hash_and_a_policy_w
     first = provenance_of(mine)
     assert first["plugins"]["some_policies"]["version"] == "1.5"
     assert set(first["policies"]) == {"mine"}
-    plugins._told.cache_clear()
+    parts._told.cache_clear()
     (policy_package / "weights.bin").write_bytes(b"2")
     second = provenance_of(mine)
     assert second["code_sha256"] != first["code_sha256"]

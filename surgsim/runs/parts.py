@@ -3,7 +3,6 @@
 import sys
 from collections.abc import Iterator
 from functools import cache
-from importlib.metadata import distributions
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +12,7 @@ from surgsim.catalog import PartConfig
 from surgsim.control.policies.registry import find_policy
 from surgsim.control.resolvers.policy import PolicyConfig
 from surgsim.errors import SurgsimError
+from surgsim.plugins import all_offers
 from surgsim.runs.sources import hash_of, package_sha256
 from surgsim.scenario.schema import Scenario
 
@@ -81,13 +81,12 @@ def _told(package: str) -> dict[str, Any] | None:
     if not file:
         return None
     place = Path(file).parent if Path(file).name == "__init__.py" else Path(file)
-    return {"version": _version(package, place), "sources_sha256": package_sha256(place)}
+    return {"version": _version(package), "sources_sha256": package_sha256(place)}
 
 
-def _version(package: str, place: Path) -> str | None:
-    """Version of the installed distribution that `package` belongs to."""
-    for one in distributions():
-        points = (point for point in one.entry_points if point.group.startswith("surgsim."))
-        if any(point.value.partition(":")[0].partition(".")[0] == package for point in points):
-            return one.version
+def _version(package: str) -> str | None:
+    """Version of the distribution that offers parts of `package`."""
+    for offer in all_offers():
+        if offer.place.partition(":")[0].partition(".")[0] == package:
+            return offer.version
     return None
