@@ -9,7 +9,6 @@ from typing import Any
 
 import pyarrow as pa
 import pyarrow.csv
-import pyarrow.parquet
 
 from surgsim.compare.job import OUTCOMES
 from surgsim.errors import SurgsimError, unknown_name

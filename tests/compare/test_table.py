@@ -8,7 +8,6 @@ from pathlib import Path
 
 import pyarrow as pa
 import pyarrow.csv
-import pyarrow.parquet
 import pytest
 
 from surgsim.compare.table import MACHINE_COLUMNS, Row, read_table, schema, write_table
