@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pyarrow as pa
+import pyarrow.parquet
 import pyarrow.csv
 
 from surgsim.compare.job import OUTCOMES
