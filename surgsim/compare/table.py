@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any
 
 import pyarrow as pa
-import pyarrow.parquet
 import pyarrow.csv
+import pyarrow.parquet
 
 from surgsim.compare.job import OUTCOMES
 from surgsim.errors import SurgsimError, unknown_name

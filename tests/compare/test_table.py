@@ -7,8 +7,8 @@ import re
 from pathlib import Path
 
 import pyarrow as pa
-import pyarrow.parquet
 import pyarrow.csv
+import pyarrow.parquet
 import pytest
 
 from surgsim.compare.table import MACHINE_COLUMNS, Row, read_table, schema, write_table
