@@ -46,6 +46,7 @@ test-all: $(INSTALLED_DEV)  ## run all tests
 check: $(INSTALLED_DEV)  ## formatting, lint and types, as CI
 	@cd '$(ROOT)' && "$(PY)" -m ruff format --check .
 	@cd '$(ROOT)' && "$(PY)" -m ruff check .
+	@cd '$(ROOT)' && "$(PY)" -m ruff check --preview --select PLW1514 .
 	@cd '$(ROOT)' && "$(PY)" -m mypy
 
 bench: $(INSTALLED)  ## measure the speed on this machine

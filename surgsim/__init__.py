@@ -11,9 +11,10 @@ Example:
 """
 
 import importlib
-from typing import TYPE_CHECKING, Any
 
+TYPE_CHECKING = False  # type checkers take it for true; the module `typing` takes a while to import
 if TYPE_CHECKING:
+    from surgsim.api.available import available
     from surgsim.api.comparing import compare
     from surgsim.api.comparison import Comparison
     from surgsim.api.loading import load
@@ -32,6 +33,7 @@ __all__ = [
     "Scenario",
     "SurgsimError",
     "Trace",
+    "available",
     "compare",
     "load",
     "read",
@@ -44,6 +46,7 @@ _PLACES = {
     "Scenario": "surgsim.scenario.schema",
     "SurgsimError": "surgsim.errors",
     "Trace": "surgsim.trace.trace",
+    "available": "surgsim.api.available",
     "compare": "surgsim.compare",  # the folder itself, which can be called
     "load": "surgsim.api.loading",
     "read": "surgsim.api.reading",
@@ -53,7 +56,7 @@ _PLACES = {
 
 if not TYPE_CHECKING:  # to a type checker it would mean that there is every name
 
-    def __getattr__(name: str) -> Any:
+    def __getattr__(name: str) -> object:
         """A public name, imported at its first use (PEP 562)."""
         if name not in _PLACES:
             raise AttributeError(f"module 'surgsim' has no attribute {name!r}")

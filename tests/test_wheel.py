@@ -47,6 +47,7 @@ def test_it_holds_every_module_asset_and_scenario(wheel: Path) -> None:
     assert len(modules) > 50
     assert len(data) > 5
     assert (modules | data) - packed == set()
+    assert "surgsim/py.typed" in packed
     assert not [name for name in packed if name.startswith(("tests/", "docs/")) or "__pycache__" in name]
 
 

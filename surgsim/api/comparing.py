@@ -10,25 +10,32 @@ from pathlib import Path
 from typing import Any
 
 from surgsim.api.comparison import Comparison
+from surgsim.api.suites import suite_of
 from surgsim.cli.output import show_batch_progress
 from surgsim.compare.engine import Batch, Runner
 from surgsim.compare.engine import compare as run_batch
 from surgsim.compare.job import Job
-from surgsim.compare.suite import SuiteConfig, ad_hoc_suite, is_suite, load_suite, with_changes
+from surgsim.compare.observations import metric_named
+from surgsim.compare.suite import with_changes
 from surgsim.compare.workers import Done, run_jobs
+from surgsim.control.controller import ControllerConfig
 from surgsim.errors import SurgsimError
+from surgsim.scenario.load import Source
 from surgsim.scenario.plain import assignments_of
+from surgsim.scenario.schema import Scenario
 
 Name = str | os.PathLike[str]
+Controllers = Source | ControllerConfig | Sequence[Source | ControllerConfig]
 
 
 def compare(
-    what: Name | Sequence[Name],
+    what: Source | Scenario | Sequence[Source | Scenario],
     /,
     *,
-    controllers: Sequence[Name] | None = None,
+    controllers: Controllers | None = None,
     seeds: str | int | Iterable[int] | None = None,
     settings: Mapping[str, Any] | None = None,
+    matters: Mapping[str, float] | None = None,
     jobs: int | None = None,
     engine: str = "local",
     address: str | None = None,
@@ -41,10 +48,11 @@ def compare(
     """Run a suite, or scenarios with several controllers and seeds, and compare them.
 
     Args:
-        what: A suite or a scenario, or a list of scenarios: shipped names or paths.
-        controllers: Controllers instead of the suite's, or of the scenarios' own: names or paths.
+        what: A suite, by name or path; or one scenario or several: names, paths, mappings or `Scenario`s.
+        controllers: Controllers instead of the suite's, or of the scenarios' own: names, paths or mappings.
         seeds: Seeds instead of the suite's: an integer, several of them, or text such as `"0:10"`.
         settings: Values by key path for every run, as `--set` of the command.
+        matters: Smallest differences that matter, by metric, instead of the suite's.
         jobs: Worker processes; None: one for each core.
         engine: `local`, or `ray` for a cluster.
         address: The ray cluster's address.
@@ -66,8 +74,10 @@ def compare(
         >>> found.leaderboard("tip_error_rms_mm").metric
         'tip_error_rms_mm'
     """
-    suite, folder = _suite(what)
-    suite = _changed(suite, controllers, seeds, record, assignments_of(blocks, settings))
+    suite, folder = suite_of(what, controllers)
+    suite = with_changes(
+        suite, None, _seeds(seeds), record, assignments_of(blocks, settings), _known(matters)
+    )
     runner, count = _runner(engine, address), _jobs(jobs)
     with _target(out) as target, _shown(suite.name, progress) as report:
         batch = Batch(
@@ -93,31 +103,6 @@ def _target(out: Name | None) -> Iterator[Path]:
         raise
 
 
-def _suite(what: Name | Sequence[Name]) -> tuple[SuiteConfig, Path]:
-    """The suite that is meant, and the folder of its relative paths."""
-    names = [os.fspath(name) for name in ([what] if isinstance(what, str | os.PathLike) else what)]
-    if not names:
-        raise SurgsimError("give a suite, or scenarios; the list is empty")
-    if is_suite(names[0]):
-        if len(names) > 1:
-            raise SurgsimError("give one suite, or scenarios; not both")
-        return load_suite(names[0])
-    return ad_hoc_suite(names, None), Path()
-
-
-def _changed(
-    suite: SuiteConfig,
-    controllers: Sequence[Name] | None,
-    seeds: str | int | Iterable[int] | None,
-    record: bool,
-    assignments: tuple[str, ...],
-) -> SuiteConfig:
-    if isinstance(controllers, str | os.PathLike):
-        controllers = [controllers]
-    names = None if controllers is None else [os.fspath(name) for name in controllers]
-    return with_changes(suite, names, _seeds(seeds), record, assignments)
-
-
 def _seeds(seeds: str | int | Iterable[int] | None) -> str | None:
     """Seeds as the command takes them."""
     if seeds is None or isinstance(seeds, str):
@@ -128,6 +113,13 @@ def _seeds(seeds: str | int | Iterable[int] | None) -> str | None:
     if len(listed) > 1 and listed == list(range(listed[0], listed[0] + len(listed))):
         return f"{listed[0]}:{listed[-1] + 1}"  # so that --resume sees the same suite
     return ",".join(map(str, listed))
+
+
+def _known(matters: Mapping[str, float] | None) -> Mapping[str, float] | None:
+    """`matters`, if each is of a metric."""
+    for name in matters or {}:
+        metric_named(name)
+    return matters
 
 
 def _jobs(jobs: int | None) -> int:

@@ -6,6 +6,7 @@ import weakref
 from collections.abc import Iterator, Mapping
 from functools import cached_property
 from pathlib import Path
+from textwrap import fill
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -15,9 +16,11 @@ from surgsim.api.leaderboard import Leaderboard
 from surgsim.api.run import Run, read_run
 from surgsim.compare.leaderboard import leaderboard
 from surgsim.compare.observations import Array, Observations
+from surgsim.compare.summary import summary
 from surgsim.compare.table import read_table
-from surgsim.display import count, html_table, html_title, number, text_table
+from surgsim.display import WIDTH, count, html_table, html_title, number, text_table
 from surgsim.errors import SurgsimError, not_held
+from surgsim.report.results import read_results
 from surgsim.report.write import write_report
 
 if TYPE_CHECKING:
@@ -25,9 +28,12 @@ if TYPE_CHECKING:
 
 _SHOWN = {"tip_error_rms_mm": "tip error", "rcm_error_rms_mm": "RCM error"}
 """Metrics of the short table, with their headings: medians of the root mean squares [mm]."""
-_HEADER = ("controller", "runs", "completed", *_SHOWN.values())
-_RIGHT = (1, 2, 3, 4)
-_NOTE = "Errors: median over completed runs of the root mean square over time [mm]."
+_HEADER = ("controller", "runs", "completed", "not done", *_SHOWN.values())
+_RIGHT = (1, 2, 3, 4, 5)
+_NOTE = (
+    "Not done: completed, but the task was not done.\n"
+    "Errors: medians over completed runs of the root mean square over time [mm]."
+)
 
 
 class Comparison(Mapping[str, Run]):
@@ -90,7 +96,7 @@ class Comparison(Mapping[str, Run]):
 
     @cached_property
     def _runs(self) -> Observations:
-        return Observations.of(self.table)
+        return read_results(self.folder).runs
 
     @property
     def controllers(self) -> list[str]:
@@ -121,7 +127,8 @@ class Comparison(Mapping[str, Run]):
         Raises:
             SurgsimError: If there is no such metric.
         """
-        return Leaderboard(metric, leaderboard(self._runs, metric))
+        rows = leaderboard(self._runs, metric)
+        return Leaderboard(metric, rows, summary(self._runs, metric, rows).first)
 
     def report(self, path: str | os.PathLike[str] | None = None) -> Path:
         """Write the page about the batch and return where it is.
@@ -135,10 +142,13 @@ class Comparison(Mapping[str, Run]):
         return write_report(self.folder, path)
 
     def __repr__(self) -> str:
-        return f"{self._title}\n{text_table(_HEADER, self._summary(), _RIGHT)}\n{_NOTE}"
+        said = fill(self.leaderboard().sentence, WIDTH, break_long_words=False)
+        return f"{self._title}\n{said}\n\n{text_table(_HEADER, self._summary(), _RIGHT)}\n{_NOTE}"
 
     def _repr_html_(self) -> str:
-        return html_title(self._title, _NOTE) + html_table(_HEADER, self._summary(), _RIGHT)
+        return html_title(self._title, self.leaderboard().sentence, _NOTE) + html_table(
+            _HEADER, self._summary(), _RIGHT
+        )
 
     @property
     def _title(self) -> str:
@@ -156,8 +166,8 @@ class Comparison(Mapping[str, Run]):
         for name in self.controllers:
             runs = self._runs.of_controller(name)
             medians = [_median(runs.values(metric)) for metric in _SHOWN]
-            completed = int(runs.completed.sum())
-            rows.append((name, str(len(runs)), str(completed), *(number(value) for value in medians)))
+            counts = (len(runs), int(runs.completed.sum()), int(runs.not_done.sum()))
+            rows.append((name, *map(str, counts), *map(number, medians)))
         return rows
 
 

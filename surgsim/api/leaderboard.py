@@ -1,15 +1,16 @@
 """A leaderboard as Python sees it."""
 
 from collections.abc import Sequence
+from textwrap import fill
 from typing import overload
 
 from surgsim.compare.intervals import Interval
 from surgsim.compare.leaderboard import LeaderboardRow
-from surgsim.display import html_table, html_title, number, text_table
-from surgsim.metrics.catalog import METRICS
+from surgsim.display import WIDTH, html_table, html_title, number, text_table
 
-_HEADER = ("controller", "runs", "failed", "value", "95 % interval", "mean rank")
-_RIGHT = (1, 2, 3, 4, 5)
+_HEADER = ("place", "controller", "done", "value", "95 % interval")
+_RIGHT = (0, 2, 3, 4)
+_DIGITS = 3
 
 
 class Leaderboard(Sequence[LeaderboardRow]):
@@ -18,6 +19,7 @@ class Leaderboard(Sequence[LeaderboardRow]):
     Args:
         metric: The metric's name.
         rows: The rows in order.
+        sentence: Who wins, by how much and how sure.
 
     Example:
         >>> import surgsim
@@ -27,8 +29,9 @@ class Leaderboard(Sequence[LeaderboardRow]):
         ('pinv', 0)
     """
 
-    def __init__(self, metric: str, rows: Sequence[LeaderboardRow]) -> None:
+    def __init__(self, metric: str, rows: Sequence[LeaderboardRow], sentence: str) -> None:
         self.metric = metric
+        self.sentence = sentence
         self._rows = tuple(rows)
 
     @overload
@@ -42,31 +45,33 @@ class Leaderboard(Sequence[LeaderboardRow]):
         return len(self._rows)
 
     def __repr__(self) -> str:
-        return f"{self._title}\n{text_table(_HEADER, self._cells(), _RIGHT)}"
+        said = fill(self.sentence, WIDTH, break_long_words=False)
+        return f"{said}\n\n{text_table(_HEADER, self._cells(), _RIGHT)}\n{self._note}"
 
     def _repr_html_(self) -> str:
-        return html_title(self._title) + html_table(_HEADER, self._cells(), _RIGHT)
+        return html_title(self.metric, self.sentence, self._note) + html_table(_HEADER, self._cells(), _RIGHT)
 
     @property
-    def _title(self) -> str:
-        return f"{self.metric}, interquartile mean of completed runs, best mean rank first"
+    def _note(self) -> str:
+        return (
+            "Done: runs that completed and did their task. Equal places are not told apart.\n"
+            f"Value: {self.metric}, interquartile mean of completed runs."
+        )
 
     def _cells(self) -> list[tuple[str, ...]]:
-        digits = METRICS[self.metric].digits
         return [
             (
+                "-" if row.place is None else str(row.place),
                 row.controller,
-                str(row.runs),
-                str(row.failed),
-                number(row.value.value, digits),
-                _interval(row.value, digits),
-                number(row.rank.value, 3),
+                f"{row.completed - row.not_done} of {row.runs}",
+                number(row.value.value, _DIGITS),
+                _interval(row.value),
             )
             for row in self._rows
         ]
 
 
-def _interval(figure: Interval, digits: int) -> str:
+def _interval(figure: Interval) -> str:
     if figure.low is None or figure.high is None:
         return "-"
-    return f"{number(figure.low, digits)} to {number(figure.high, digits)}"
+    return f"{number(figure.low, _DIGITS)} to {number(figure.high, _DIGITS)}"

@@ -36,7 +36,7 @@ def execute(options: argparse.Namespace) -> int:
     """Print the names with a line about each."""
     from surgsim.cli.table import print_table
 
-    items = _items(options.kind)
+    items = items_of(options.kind)
     if options.json:
         print(json.dumps([{"name": name, "description": text} for name, text in items], indent=2))
     else:
@@ -44,7 +44,8 @@ def execute(options: argparse.Namespace) -> int:
     return 0
 
 
-def _items(kind: str) -> list[tuple[str, str]]:
+def items_of(kind: str) -> list[tuple[str, str]]:
+    """Names of one of `KINDS`, each with a line about it."""
     if kind in ("scenarios", "suites", "controllers"):
         return _files(kind)
     if kind == "robots":

@@ -158,6 +158,7 @@ def _prepare(batch: Batch) -> None:
         "sweeps": _plain(batch.suite.sweeps),
         "seeds": batch.suite.seeds,
         "settings": list(batch.suite.settings),
+        "given": json.loads(batch.suite.given.model_dump_json()),
     }
     try:
         make_folder(out)

@@ -48,6 +48,18 @@ def _check_seeds(text: str) -> str:
     return text
 
 
+class GivenConfig(PartConfig):
+    """What a suite names that has no file: its content in place.
+
+    Attributes:
+        scenarios: Content by the name that the suite's `scenarios` use.
+        controllers: The same of its `controllers`.
+    """
+
+    scenarios: dict[Name, dict[str, Any]] = Field(default_factory=dict)
+    controllers: dict[Name, dict[str, Any]] = Field(default_factory=dict)
+
+
 class SuiteConfig(PartConfig):
     """A batch comparison.
 
@@ -63,6 +75,7 @@ class SuiteConfig(PartConfig):
         record: Whether every run writes its recording.
         settings: `key.path=value` settings of every run.
         matters: Smallest differences that matter, by metric, in its unit; the metrics' own for the others.
+        given: Scenarios and controllers in place, by the names that stand above.
     """
 
     name: Name
@@ -76,6 +89,7 @@ class SuiteConfig(PartConfig):
     record: bool = False
     settings: tuple[str, ...] = ()
     matters: dict[str, Annotated[FiniteFloat, Field(ge=0.0)]] = Field(default_factory=dict)
+    given: GivenConfig = GivenConfig()
 
     @field_validator("matters")
     @classmethod
@@ -112,6 +126,7 @@ class RunSpec:
     Attributes:
         scenario: Name or path of the scenario.
         controller: Name or path of the controller, or None for the scenario's own.
+        given: Content of those that have no file.
         parameters: This run's point: key paths of the grid with their values, axes with their levels.
         settings: `key.path=value` settings of every run.
         assignments: The same of this point.
@@ -121,6 +136,7 @@ class RunSpec:
 
     scenario: str
     controller: str | None
+    given: GivenConfig
     parameters: tuple[tuple[str, Any], ...]
     settings: tuple[str, ...]
     assignments: tuple[str, ...]
@@ -133,9 +149,12 @@ class RunSpec:
         Raises:
             ScenarioError: If it is not valid.
         """
-        assignments = (*self.settings, *self.assignments)
+        scenario, controller = self.scenario, self.controller
         return load_scenario(
-            self.scenario, controller=self.controller, assignments=assignments, seed=self.seed
+            self.given.scenarios.get(scenario, scenario),
+            controller=None if controller is None else self.given.controllers.get(controller, controller),
+            assignments=(*self.settings, *self.assignments),
+            seed=self.seed,
         )
 
 
@@ -188,6 +207,7 @@ def expand(suite: SuiteConfig, folder: Path) -> list[RunSpec]:
         RunSpec(
             scenario=_near(scenario, folder),
             controller=None if controller is None else _near(controller, folder),
+            given=suite.given,
             parameters=point.parameters,
             settings=suite.settings,
             assignments=point.assignments,

@@ -11,7 +11,7 @@ import pytest
 
 import surgsim
 
-FUNCTIONS = ("compare", "load", "read", "run")
+FUNCTIONS = ("available", "compare", "load", "read", "run")
 CLASSES = ("Comparison", "Run", "Scenario", "SurgsimError", "Trace")
 
 
@@ -59,6 +59,14 @@ def test_compare_can_be_called_whether_or_not_its_folder_was_imported_before(fir
 
 def test_help_of_compare_shows_its_options():
     assert {"controllers", "seeds", "out", "resume"} <= set(inspect.signature(surgsim.compare).parameters)
+
+
+def test_what_can_be_named_is_listed_and_a_wrong_kind_refused():
+    assert {"pinv", "qp"} <= set(surgsim.available("controllers"))
+    with pytest.raises(
+        surgsim.SurgsimError, match=r"'robot' is not a kind of thing to list. Known.*'robots'"
+    ):
+        surgsim.available("robot")
 
 
 def examples() -> list[doctest.DocTest]:

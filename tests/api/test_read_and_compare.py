@@ -44,6 +44,7 @@ def test_its_table_and_its_leaderboard(batch):
     assert isinstance(frame, pd.DataFrame)
     assert frame["outcome"].tolist() == found.table.column("outcome").to_pylist() == ["completed"] * 4
     board = found.leaderboard("tip_error_rms_mm")
+    assert repr(board).startswith("Nobody wins by tip error")
     means = frame.groupby("controller")["tip_error_rms_mm"].mean()
     assert {row.controller: row.value.value for row in board} == pytest.approx(means.to_dict())
     with pytest.raises(surgsim.SurgsimError, match=r"'tip' is not a metric\. Known"):
@@ -92,6 +93,25 @@ def test_a_batch_goes_on_and_one_of_other_settings_is_refused(batch, quick, tmp_
         surgsim.compare("circle_lwr4plus", resume=True, **{**again, "seeds": 0})
 
 
+def test_scenarios_and_controllers_are_taken_as_content_too(quick, tmp_path):
+    small = surgsim.load("circle_lwr4plus", name="small", **quick)
+    tree = {**small.resolved(), "name": "smaller", "task": {**small.resolved()["task"], "radius_m": 0.001}}
+    stiff = {**small.controller.model_dump(mode="json"), "name": "stiff"}
+    options = {"controllers": ["pinv", stiff], "jobs": 1, "out": tmp_path / "out"}
+    found = surgsim.compare([small, tree], **options)
+    assert (found.scenarios, found.controllers) == (["small", "smaller"], ["pinv", "stiff"])
+    assert found["smaller/stiff/base-seed0"].scenario.task.radius_m == 0.001
+    again = surgsim.compare([small, tree], resume=True, **options)
+    assert again.table.equals(found.table)
+    tree["task"]["radius_m"] = 0.0015
+    with pytest.raises(
+        surgsim.SurgsimError, match="holds the results of another suite, or of other settings"
+    ):
+        surgsim.compare([small, tree], resume=True, **options)
+    with pytest.raises(surgsim.SurgsimError, match="two of the scenarios are called 'small'"):
+        surgsim.compare([small, small])
+
+
 @pytest.mark.parametrize(
     ("options", "text"),
     [
@@ -102,6 +122,9 @@ def test_a_batch_goes_on_and_one_of_other_settings_is_refused(batch, quick, tmp_
         ({"address": "host:1"}, "--address is for --engine ray"),
         ({"settings": {"seed": 3}}, "--set seed=3: the seeds of a suite are given by --seeds"),
         ({"tsk": {"radius_m": 0.1}}, "--set tsk.radius_m=0.1: tsk: unknown key"),
+        ({"controllers": []}, "give controllers; the list is empty"),
+        ({"controllers": [3]}, "a int is no controller: give a name, a path or a mapping"),
+        ({"matters": {"tip": 1.0}}, "'tip' is not a metric. Known"),
         ({"controllers": ["vprn"]}, "--controller: 'vprn' is not a shipped controller. Known"),
     ],
 )

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 
+from surgsim.catalog import PartConfig
 from surgsim.compare.suite import (
     MOST_RUNS,
     SuiteConfig,
@@ -276,6 +277,7 @@ def test_every_key_is_documented_with_its_default():
         else:
             default = field.get_default(call_default_factory=True)
             shown = list(default) if isinstance(default, tuple) else default
+            shown = shown.model_dump() if isinstance(shown, PartConfig) else shown
             assert parse_yaml(f"x: {rows[key].strip('`')}", key).tree["x"] == shown
 
 

@@ -63,24 +63,21 @@ def _board(results: Results, boards: Boards, metrics: Sequence[str], classes: st
     for name, row in main.items():
         swatch = html.swatch(results.runs.controllers.index(name))
         cells = [f'<th scope="row">{swatch}{html.breakable(name)}</th>']
-        if places:
-            cells += [
-                _number(row.place),
-                _failed(row),
-                *([_not_done(row)] if judged else []),
-                _rank(row.rank),
-            ]
-        cells += [_value(boards[metric][name], name in best[metric]) for metric in metrics]
-        rows.append(cells)
+        figures = [_value(boards[metric][name], name in best[metric]) for metric in metrics]
+        if places:  # the main metric stays in sight on a phone
+            counts = [_failed(row), *([_not_done(row)] if judged else []), _rank(row.rank)]
+            figures = [_number(row.place), figures[0], *counts, *figures[1:]]
+        rows.append([*cells, *figures])
     head = [_heading("controller", "controller", "", "text", "ascending")]
+    figures = [_metric_heading(name) for name in metrics]
     if places:
-        head.append(_heading("place", "place", "", "number", "ascending", sort="ascending"))
-        head.append(_heading("failed", "failed", "of all runs", "number", "ascending"))
-        head += (
-            [_heading("not done", "task not done", "of completed", "number", "ascending")] if judged else []
-        )
-        head.append(_heading("mean rank", "mean rank", "1 is best", "number", "ascending"))
-    head += [_metric_heading(name) for name in metrics]
+        place = _heading("place", "place", "", "number", "ascending", sort="ascending")
+        counts = [_heading("failed", "failed", "of all runs", "number", "ascending")]
+        if judged:
+            counts.append(_heading("not done", "task not done", "of completed", "number", "ascending"))
+        counts.append(_heading("mean rank", "mean rank", "1 is best", "number", "ascending"))
+        figures = [place, figures[0], *counts, *figures[1:]]
+    head += figures
     return html.table("Leaderboard" if places else "Leaderboard, more metrics", head, rows, classes)
 
 
