@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from surgsim.control.rcm import rcm_kinematics
-from surgsim.control.torque_laws.rcm_inverse_dynamics import RcmInverseDynamics, RcmInverseDynamicsConfig
+from surgsim.control.torque_laws.rcm_inverse_dynamics import RcmInverseDynamicsConfig
 
 
 @pytest.fixture
@@ -33,7 +33,7 @@ def at_rest(arm, torque_problem):
 
 def _acceleration(arm, problem, contact, f_T):
     """Joint acceleration (7,) of an arm on whose tip `f_T` really acts and is measured."""
-    law = RcmInverseDynamics(RcmInverseDynamicsConfig(contact=contact), arm)
+    law = RcmInverseDynamicsConfig(contact=contact).build(arm)
     p = replace(problem, f_T=f_T)
     terms, _ = law.torque(p, law.start(p))
     assert not terms[5].any(), "a limit was met"
