@@ -16,7 +16,9 @@ Array = NDArray[np.float64]
 RCM_ROWS = 2
 
 
-def fill_constants(seen: Any, arm: ArmModel, *, dt_s: float, has_trocar: bool, omega_gain: float) -> None:
+def fill_constants(
+    seen: Any, arm: ArmModel, *, dt_s: float, has_trocar: bool, omega_gain: float, shared: bool = False
+) -> None:
     """Write what does not change over a run."""
     limits = arm.limits
     seen.dt_s, seen.omega_gain, seen.budget_j, seen.first = dt_s, omega_gain, np.inf, 1
@@ -25,13 +27,13 @@ def fill_constants(seen: Any, arm: ArmModel, *, dt_s: float, has_trocar: bool, o
     seen.p_WC[:] = np.nan
     seen.q_min[:], seen.q_max[:], seen.v_max[:] = limits.q_min, limits.q_max, limits.velocity
     seen.a_max[:], seen.tau_max[:] = limits.acceleration, limits.torque
-    arm.point(seen.elsewhere)
+    arm.point(seen.elsewhere, shared=shared)
 
 
 def new_seen(arm: ArmModel, *, dt_s: float, has_trocar: bool, omega_gain: float = 1.0) -> Any:
-    """A record for `arm`, which must outlive it."""
+    """A record for one call with `arm`, which must outlive it."""
     seen = new(Seen, arm.limits.q_min.size)
-    fill_constants(seen, arm, dt_s=dt_s, has_trocar=has_trocar, omega_gain=omega_gain)
+    fill_constants(seen, arm, dt_s=dt_s, has_trocar=has_trocar, omega_gain=omega_gain, shared=True)
     return seen
 
 

@@ -81,13 +81,15 @@ class ArmModel:
         """Viscous joint damping of the nominal model (7,) [N m s/rad]."""
         return np.array(self._model.dof_damping, dtype=float)
 
-    def point(self, record: Any) -> None:
-        """Let a `surgsim.tick.arrays.Model` record evaluate this arm, with data of its own.
+    def point(self, record: Any, *, shared: bool = False) -> None:
+        """Let a `surgsim.tick.arrays.Model` record evaluate this arm, with data of its own or `shared` ones.
 
-        This object must outlive the record.
+        This object must outlive the record. Shared data are those of this object's own evaluations.
         """
-        model, data, site = self._model, mujoco.MjData(self._model), self._scene.tip_site
-        self._held.append(data)
+        model, site = self._model, self._scene.tip_site
+        data = self._data if shared else mujoco.MjData(model)
+        if not shared:
+            self._held.append(data)
         record.model, record.data, record.site = model._address, data._address, site
         record.qpos, record.qvel = data.qpos.ctypes.data, data.qvel.ctypes.data
         record.site_xpos, record.site_xmat = (
