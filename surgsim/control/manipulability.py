@@ -7,12 +7,16 @@ For a chain of revolute joints with axes z_i and translational Jacobian columns 
 so no finite differences are needed.
 """
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
 from surgsim.compiled import compiled
-from surgsim.models.arm import ArmModel, Kinematics
-from surgsim.tick.algebra import back_substitute_rows, factor, outer_product
+from surgsim.models.arm import Kinematics
+from surgsim.tick.algebra import back_substitute_rows, determinant, dot, factor, outer_product
+from surgsim.tick.arrays import Model
+from surgsim.tick.nominal import kinematics
 
 Array = NDArray[np.float64]
 
@@ -125,10 +129,22 @@ def fill_velocity_products(J: Array, z: Array, v: Array, linear: Array, angular:
             angular[2] += w * (z[i, 0] * z[j, 1] - z[i, 1] * z[j, 0])
 
 
-def manipulability_series(arm: ArmModel, q: Array) -> tuple[Array, Array]:
-    """Manipulability along joint positions `q` (n, 7): of the 3x7 and the 6x7 tip Jacobian, each (n,)."""
-    finite = np.asarray(np.isfinite(q).all(axis=1))
-    J = arm.jacobians(np.where(finite[:, None], q, 0.0))
-    squares = np.linalg.det(J[:, :3] @ J[:, :3].transpose(0, 2, 1)), np.linalg.det(J @ J.transpose(0, 2, 1))
-    translational, whole = (np.where(finite, np.sqrt(np.maximum(s, 0.0)), np.nan) for s in squares)
-    return translational, whole
+@compiled
+def manipulabilities(model: Model, q: Array) -> tuple[float, float]:
+    """Manipulability of the translational and the whole tip Jacobian at `q` (n,) [rad]; NaN for a `q` that is.
+
+    Mu = sqrt(det(J J^T)), with J (3, n) and (6, n).
+    """
+    if not math.isfinite(dot(q, q)):
+        return math.nan, math.nan
+    kinematics(model, q)
+    Jv, Jw = model.Jv_WT, model.Jw_WT
+    A, B, whole = np.empty((3, 3)), np.empty((3, 3)), np.empty((6, 6))
+    outer_product(Jv, Jv, A)
+    whole[:3, :3] = A
+    outer_product(Jw, Jv, B)
+    whole[3:, :3] = B
+    whole[:3, 3:] = B.T
+    outer_product(Jw, Jw, B)
+    whole[3:, 3:] = B
+    return math.sqrt(max(determinant(A), 0.0)), math.sqrt(max(determinant(whole), 0.0))

@@ -109,14 +109,6 @@ class ArmModel:
         self._place(q)
         return self._read_dynamics(v)
 
-    def jacobians(self, q: Array) -> Array:
-        """Tip Jacobians (n, 6, 7), translation above rotation, at joint positions `q` (n, 7) [rad]."""
-        J = np.empty((len(q), 6, 7))
-        for row, jacobian in zip(q, J, strict=True):
-            self._place(row)
-            mujoco.mj_jacSite(self._model, self._data, jacobian[:3], jacobian[3:], self._scene.tip_site)
-        return J
-
     def evaluate(self, q: Array, v: Array) -> tuple[Kinematics, Dynamics]:
         """Both at once, for one placement of the model."""
         self._place(q)

@@ -81,7 +81,7 @@ class Simulation:
             "controller": setup.controller.columns,
             "plant": plant.columns,
         }
-        self._rows = Rows(BASE_BLOCKS, groups, last + 1 + self._stop_ticks)
+        self._rows = Rows(BASE_BLOCKS, groups, last + 1 + self._stop_ticks, setup.arm)
         self._task = BoundTask(setup.task, setup.controller.control.command)
         n = setup.arm.limits.q_min.size
         self._stop = new_stop(scenario.safety.stop or StopConfig(), setup.arm)
@@ -248,4 +248,4 @@ class Simulation:
             },
             ending=ending,
         )
-        return self._rows.finish(int(self._run.progress.rows), meta, self._setup.arm)
+        return self._rows.finish(int(self._run.progress.rows), meta)

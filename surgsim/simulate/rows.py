@@ -4,8 +4,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surgsim.columns import Block
-from surgsim.control.manipulability import manipulability_series
+from surgsim.compiled import as_parameter
 from surgsim.models.arm import ArmModel
+from surgsim.simulate.derived import DERIVED_BLOCKS, derive, derive_signature
+from surgsim.tick.arrays import Model, new
 from surgsim.trace.trace import Trace, TraceMeta
 
 Array = NDArray[np.float64]
@@ -19,6 +21,7 @@ class Rows:
         base: Blocks of every trace.
         groups: Further blocks by who writes them, each group side by side in a row.
         rows: Most rows that can be written.
+        arm: The nominal arm, whose manipulability is derived.
 
     Attributes:
         at: Where the columns of a block are in a row.
@@ -26,7 +29,7 @@ class Rows:
         data: The rows.
     """
 
-    def __init__(self, base: Group, groups: dict[str, Group], rows: int) -> None:
+    def __init__(self, base: Group, groups: dict[str, Group], rows: int, arm: ArmModel) -> None:
         self._blocks = (*base, *(block for group in groups.values() for block in group))
         self.at: dict[str, slice] = {}
         width = 0
@@ -40,21 +43,20 @@ class Rows:
             self.group[name] = slice(first, last)
             first = last
         self.data = np.full((rows, width), np.nan)
+        n = arm.limits.q_min.size
+        self._model = new(Model, n)
+        arm.point(self._model)
+        self._derived = self.begins(*DERIVED_BLOCKS)
+        self._derive = as_parameter(derive, derive_signature(n))
 
     def begins(self, *names: str) -> NDArray[np.int64]:
         """Where blocks and groups begin in a row."""
         places = {**self.at, **self.group}
         return np.array([places[name].start for name in names], dtype=np.int64)
 
-    def finish(self, count: int, meta: TraceMeta, arm: ArmModel) -> Trace:
+    def finish(self, count: int, meta: TraceMeta) -> Trace:
         """The first `count` rows with the derived columns, as a trace."""
-        data, at = self.data[:count].copy(), self.at
-        tip, wrist, trocar = data[:, at["tip"]], data[:, at["wrist"]], data[:, at["trocar"]]
-        data[:, at["tip_error"]] = np.linalg.norm(tip - data[:, at["tip_ref"]], axis=1, keepdims=True)
-        axis = (tip - wrist) / np.linalg.norm(tip - wrist, axis=1, keepdims=True)
-        data[:, at["rcm_error"]] = np.linalg.norm(np.cross(trocar - tip, axis), axis=1, keepdims=True)
-        translational, whole = manipulability_series(arm, data[:, at["q"]])
-        data[:, at["manipulability"]] = translational[:, None]
-        data[:, at["manipulability_6d"]] = whole[:, None]
+        data = self.data[:count].copy()
+        self._derive(self._model, data, self._derived)
         data.flags.writeable = False
         return Trace(data, self._blocks, meta)

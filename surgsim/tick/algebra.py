@@ -161,3 +161,27 @@ def nearest(J: Array, v: Array, wanted: Array, out: Array) -> bool:
             s += J[i, j] * gap[i]
         out[j] = s
     return True
+
+
+@compiled
+def determinant(A: Array) -> float:
+    """Determinant of A (n, n) by Gauss with row pivots; A is spent."""
+    n = A.shape[0]
+    product = 1.0
+    for k in range(n):
+        p = k
+        for i in range(k + 1, n):
+            if abs(A[i, k]) > abs(A[p, k]):
+                p = i
+        if A[p, k] == 0.0:
+            return 0.0
+        if p != k:
+            product = -product
+            for j in range(k, n):
+                A[k, j], A[p, j] = A[p, j], A[k, j]
+        product *= A[k, k]
+        for i in range(k + 1, n):
+            c = A[i, k] / A[k, k]
+            for j in range(k + 1, n):
+                A[i, j] -= c * A[k, j]
+    return product

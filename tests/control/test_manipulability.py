@@ -7,9 +7,10 @@ from surgsim.control.manipulability import (
     diamond,
     jacobian_gradient,
     log_manipulability_gradient,
+    manipulabilities,
     manipulability,
-    manipulability_series,
 )
+from surgsim.tick.arrays import Model, new
 
 STEP = 1e-6
 seeds = pytest.mark.parametrize("seed", range(5))
@@ -86,12 +87,15 @@ def test_manipulability_is_zero_when_a_direction_is_lost(arm):
         log_manipulability_gradient(J, arm.kinematics(np.zeros(7)).z_W)
 
 
-def test_series_has_both_measures_at_every_row_and_nan_where_the_state_is_lost(arm, random_q):
-    q = np.array([random_q(np.random.default_rng(seed)) for seed in range(3)])
-    q[1, 4] = np.nan
-    translational, whole = manipulability_series(arm, q)
-    assert np.isnan(translational).tolist() == np.isnan(whole).tolist() == [False, True, False]
-    for i in (0, 2):
-        kin = arm.kinematics(q[i])
-        assert translational[i] == pytest.approx(manipulability(kin.Jv_WT), rel=1e-12)
-        assert whole[i] == pytest.approx(manipulability(np.vstack([kin.Jv_WT, kin.Jw_WT])), rel=1e-12)
+def test_both_measures_of_a_record_are_numpy_s_and_nan_where_the_state_is_lost(arm, random_q):
+    record = new(Model, 7)
+    arm.point(record)
+    for seed in range(50):
+        q = random_q(np.random.default_rng(seed))
+        translational, whole = manipulabilities(record, q)
+        kin = arm.kinematics(q)
+        assert translational == pytest.approx(manipulability(kin.Jv_WT), rel=1e-12)
+        assert whole == pytest.approx(manipulability(np.vstack([kin.Jv_WT, kin.Jw_WT])), rel=1e-12)
+        assert manipulabilities.py_func(record, q) == (translational, whole)
+    q[4] = np.nan
+    assert np.isnan(manipulabilities(record, q)).all()
