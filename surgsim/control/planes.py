@@ -1,5 +1,6 @@
 """Virtual walls of the workspace."""
 
+import math
 from collections.abc import Sequence
 from typing import Self
 
@@ -8,8 +9,9 @@ from numpy.typing import NDArray
 from pydantic import FiniteFloat, model_validator
 
 from surgsim.catalog import PartConfig
-from surgsim.models.arm import Kinematics
+from surgsim.compiled import compiled
 from surgsim.models.config import Vec3
+from surgsim.tick.arrays import Seen
 
 Array = NDArray[np.float64]
 
@@ -32,23 +34,33 @@ class PlaneConfig(PartConfig):
         return self
 
 
-class Planes:
+def plane_numbers(configs: Sequence[PlaneConfig]) -> Array:
+    """Walls as `fill_plane_rows` takes them: of each its unit normal and offset [m], in a row (4 k,)."""
+    numbers: list[float] = []
+    for plane in configs:
+        length = math.sqrt(sum(x * x for x in plane.normal))
+        numbers += [*(x / length for x in plane.normal), plane.offset_m]
+    return np.array(numbers, dtype=np.float64)
+
+
+@compiled
+def fill_plane_rows(planes: Array, gain: float, seen: Seen, G: Array, most: Array) -> None:
     """Rows n . J_T q' <= gain (offset - n . p), one for each wall: the tip comes to rest on it.
 
     Args:
-        configs: The walls.
-        gain_per_s: How fast the tip may approach a wall [1/s].
+        planes: The walls, from `plane_numbers` (4 k,).
+        gain: How fast the tip may approach a wall [1/s].
+        seen: Tip and Jacobian.
+        G: Rows, of which the first n columns are filled (k, n or more).
+        most: Filled with their upper bounds (k,) [m/s].
     """
-
-    def __init__(self, configs: Sequence[PlaneConfig], gain_per_s: float) -> None:
-        self._normals = np.array([plane.normal for plane in configs], dtype=float).reshape(-1, 3)
-        self._normals /= np.linalg.norm(self._normals, axis=1, keepdims=True)
-        self._offsets = np.array([plane.offset_m for plane in configs])
-        self._gain = gain_per_s
-
-    def __len__(self) -> int:
-        return len(self._offsets)
-
-    def rows(self, kin: Kinematics) -> tuple[Array, Array]:
-        """Rows (n, 7) and their upper bounds (n,) [m/s]."""
-        return self._normals @ kin.Jv_WT, self._gain * (self._offsets - self._normals @ kin.p_WT)
+    for k in range(most.size):
+        room = planes[4 * k + 3]
+        for i in range(3):
+            room -= planes[4 * k + i] * seen.p_WT[i]
+        most[k] = gain * room
+        for j in range(seen.q.size):
+            s = 0.0
+            for i in range(3):
+                s += planes[4 * k + i] * seen.Jv_WT[i, j]
+            G[k, j] = s

@@ -1,4 +1,4 @@
-"""Dense quadratic programs, by one of several solvers: daqp, OSQP, or another that qpsolvers knows."""
+"""Dense quadratic programs in Python, by one of several solvers: ours, daqp, OSQP, others of qpsolvers."""
 
 import warnings
 from collections.abc import Callable
@@ -9,11 +9,13 @@ import daqp
 import numpy as np
 from numpy.typing import NDArray
 
+from surgsim.tick.quadratic_program import SOLVED, solve, workspace
+
 Array = NDArray[np.float64]
 Solve = Callable[[Array, Array, Array, Array, Array, Array, Array], Array | None]
 """H, f, lower, upper, G, G_lower, G_upper to the minimiser, or None: what a back end is."""
 
-SHIPPED = ("daqp", "osqp")
+SHIPPED = ("active_set", "daqp", "osqp")
 """Back ends that start from their last answer; they are tested on every scenario that names a QP."""
 
 _EQUALITY, _INEQUALITY = 5, 0
@@ -22,14 +24,14 @@ _EQUALITY, _INEQUALITY = 5, 0
 class DenseQp:
     """min 1/2 x^T H x + f^T x  subject to  lower <= x <= upper,  G_lower <= G x <= G_upper.
 
-    H is positive definite; rows with equal bounds are equalities. `daqp` and `osqp` start from what they know
+    H is positive definite; rows with equal bounds are equalities. The shipped ones start from what they know
     of the last solve, so that a run needs a `DenseQp` of its own.
 
     Args:
         backend: One of `SHIPPED`, or the name of another solver that qpsolvers knows here.
     """
 
-    def __init__(self, backend: str = "daqp") -> None:
+    def __init__(self, backend: str = "active_set") -> None:
         self._solve = _backend(backend)
 
     def solve(
@@ -42,6 +44,8 @@ class DenseQp:
 
 
 def _backend(name: str) -> Solve:
+    if name == "active_set":
+        return _ActiveSet().solve
     if name == "daqp":
         return _Daqp().solve
     if name == "osqp":
@@ -49,6 +53,27 @@ def _backend(name: str) -> Solve:
 
         return Osqp().solve
     return partial(_solve_with, name)
+
+
+class _ActiveSet:
+    """The kernel of the loop: the active set of the last solve is its guess."""
+
+    def __init__(self) -> None:
+        self._side = np.zeros(0, dtype=np.int64)
+
+    def solve(
+        self, H: Array, f: Array, lower: Array, upper: Array, G: Array, G_lower: Array, G_upper: Array
+    ) -> Array | None:
+        n, rows = G.shape[1], G.shape[0]
+        work, active, side = workspace(n, rows)
+        if self._side.size == side.size:
+            side = self._side
+        x = np.empty(n)
+        c = np.ascontiguousarray
+        low, high, G_low, G_high = c(lower), c(upper), c(G_lower), c(G_upper)
+        found = solve(c(H), c(f), low, high, c(G), G_low, G_high, side, x, work, active)
+        self._side = side if found == SOLVED else np.zeros(0, dtype=np.int64)
+        return x if found == SOLVED else None
 
 
 class _Daqp:

@@ -51,7 +51,8 @@ class KernelResolver:
         gains: The law's numbers, laid out as the kernel says.
         memory_size: Length of its memory, all zeros before the first step.
         columns: What it adds to the trace.
-        failures: What each status of the kernel means, for the person who reads the outcome.
+        failures: What each status of the kernel means, for the person who reads the outcome: words, or a
+            function of what the kernel saw.
         examine: Arrays that let a failure be examined, from what the kernel saw and remembered.
     """
 
@@ -60,7 +61,7 @@ class KernelResolver:
     gains: Array
     memory_size: int = 0
     columns: tuple[Block, ...] = ()
-    failures: Mapping[int, str] = field(default_factory=dict)
+    failures: Mapping[int, str | Callable[[Seen], str]] = field(default_factory=dict)
     examine: Callable[[Array, Seen, Array], Mapping[str, Array]] | None = None
 
     def start(self, problem: VelocityProblem) -> None:
@@ -91,7 +92,8 @@ class KernelResolver:
     def failure(self, status: int, seen: Any, memory: Array) -> ControlFailure:
         """Why there is no answer."""
         data = {"q": seen.q.copy()} if self.examine is None else self.examine(self.gains, seen, memory)
-        return failure_of(status, self.failures, data)
+        told = {of: text if isinstance(text, str) else text(seen) for of, text in self.failures.items()}
+        return failure_of(status, told, data)
 
     def _resolution(self, problem: VelocityProblem, out: Any) -> Resolution:
         told, width = problem.command, sum(len(block.columns) for block in self.columns)

@@ -1,7 +1,7 @@
 """Passive QP: the remote side of passive convex teleoperation, with an energy budget as a row."""
 
 import math
-from dataclasses import dataclass
+from collections.abc import Mapping
 from typing import Annotated, Literal
 
 import numpy as np
@@ -11,20 +11,38 @@ from pydantic import AfterValidator, Field, NonNegativeFloat, PositiveFloat
 from surgsim.catalog import PartConfig
 from surgsim.columns import Block, scalar, vector
 from surgsim.compiled import compiled
-from surgsim.control.failure import ControlFailure
-from surgsim.control.planes import PlaneConfig, Planes
-from surgsim.control.problem import Resolution, VelocityProblem, braking_bounds
-from surgsim.control.qp import DenseQp
-from surgsim.control.resolvers.qp import check_backend
-from surgsim.errors import Outcome
+from surgsim.control.planes import PlaneConfig, fill_plane_rows, plane_numbers
+from surgsim.control.resolvers.base import KernelResolver
+from surgsim.control.resolvers.program import (
+    OWN,
+    Program,
+    SolvedInPython,
+    Solver,
+    check_solver,
+    examined,
+    solve_warm,
+)
+from surgsim.control.resolvers.rows import fill_braking
 from surgsim.models.arm import ArmModel
-from surgsim.plant.state import NO_FORCE
-from surgsim.tasks.base import TipCommand
+from surgsim.tick.algebra import dot, norm, times
+from surgsim.tick.arrays import Resolved, Seen
+from surgsim.tick.status import GOES_ON, INFEASIBLE
 
 Array = NDArray[np.float64]
 
+WEIGHT, SLACK, ROLL_SLACK, K_TIP, K_RCM, SHARE, SPEED, LEAD, WALL_GAIN, WALLS = range(10)
+"""Gains: w, w_s, w_r, k_tip, k_rcm, share of the budget or 0, v_max, lead, walls' gain, first wall."""
+COLUMNS: tuple[Block, ...] = (
+    vector("slack", "m_per_s"),
+    scalar("slack_roll", "rad_per_s"),
+    scalar("passivity_active"),
+    scalar("planes_active"),
+    scalar("qp_relaxed"),
+)
+_BUDGET, _WALLS, _RELAXED = 4, 5, 6  # places of the values after the slacks
+_SLACKS = 4
+_TASK_ROWS = 10  # tip, roll, RCM, budget, speed
 _ACTIVE = 1e-9
-_NO_SHAFT, _NO_SPEED = np.zeros((0, 7)), np.zeros(0)
 
 
 class PassiveQpConfig(PartConfig):
@@ -42,7 +60,7 @@ class PassiveQpConfig(PartConfig):
         plane_gain_per_s: How fast the tip may approach a wall [1/s].
         tip_speed_max_m_per_s: Limit of the commanded tip speed along each axis, taken up by the slack [m/s].
         lead_max_m: How far the integrated tip reference may lead the measured tip [m].
-        solver: `daqp`, `osqp`, or another solver that qpsolvers finds installed, by its name.
+        solver: `active_set`, `daqp`, `osqp`, or another solver that qpsolvers finds installed, by its name.
     """
 
     type: Literal["passive_qp"] = "passive_qp"
@@ -57,43 +75,29 @@ class PassiveQpConfig(PartConfig):
     plane_gain_per_s: PositiveFloat = 20.0
     tip_speed_max_m_per_s: PositiveFloat = 0.25
     lead_max_m: PositiveFloat = 0.001
-    solver: Annotated[str, AfterValidator(check_backend)] = "daqp"
+    solver: Annotated[str, AfterValidator(check_solver)] = OWN
 
-    def build(self, arm: ArmModel) -> "PassiveQp":
+    def build(self, arm: ArmModel) -> KernelResolver:
         """The resolver."""
-        return PassiveQp(self)
+        n, walls = arm.limits.q_min.size, len(self.planes)
+        numbers = [self.velocity_weight, self.slack_weight, self.roll_slack_weight, self.k_tip, self.k_rcm]
+        numbers += [self.budget_share * self.passivity, self.tip_speed_max_m_per_s, self.lead_max_m]
+        numbers += [self.plane_gain_per_s]
+        text = f"QP: no joint velocity meets the RCM, {walls} planes, the energy budget and the bounds"
+        return KernelResolver(
+            kernel=passive_qp if self.solver == OWN else SolvedInPython(_solved_in_python, self.solver),
+            arm=arm,
+            gains=np.concatenate((np.array(numbers, dtype=np.float64), plane_numbers(self.planes))),
+            memory_size=2 * n + 6 + _SLACKS + _TASK_ROWS + walls,
+            columns=COLUMNS,
+            failures={INFEASIBLE: text},
+            examine=_examine,
+        )
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class PassiveQpMemory:
-    """State of the resolver.
-
-    Attributes:
-        qdot: Last answer (7,) [rad/s].
-        v_T: Its tip velocity (3,) [m/s].
-        p_Td: Tip reference, integrated from the answers (3,) [m].
-    """
-
-    qdot: Array
-    v_T: Array
-    p_Td: Array
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Program:
-    """The program's matrices; see `DenseQp.solve`."""
-
-    H: Array
-    f: Array
-    lower: Array
-    upper: Array
-    G: Array
-    G_lower: Array
-    G_upper: Array
-
-
-class PassiveQp:
-    """min 1/2 q'^T W q' + s^T W_s s  over joint velocities q' and the slack s (4,).
+@compiled
+def passive_qp(gains: Array, seen: Seen, memory: Array, out: Resolved) -> int:
+    """Minimise 1/2 q'^T W q' + s^T W_s s  over joint velocities q' and the slack s (4,).
 
         J_rcm q' = -K_rcm e + N C'                       RCM, hard: no slack
         J_T q'   = v_d + s_1..3,  d . J_w q' = w_d + s_4   tip and roll, soft
@@ -110,184 +114,118 @@ class PassiveQp:
     `lead_max_m`. The instrument has no wrist, so of the paper's angular rows the roll is the one left free by
     the RCM.
 
+    Memory: the last q' (n,), its tip velocity (3,), the tip reference integrated from it (3,), and the sides
+    of the last solution.
+
     Source: passive convex teleoperation paper, sections 1.1-1.4.
     """
+    n = seen.q.size
+    _begin(seen, memory)
+    sides, x, relaxed = memory[n + 6 :], np.empty(n + _SLACKS), 0.0
+    program = passive_program(gains, seen, memory, True)
+    sides = sides[: x.size + program[5].size]
+    if not solve_warm(program, sides, x):
+        program, relaxed = passive_program(gains, seen, memory, False), 1.0
+        if not solve_warm(program, sides, x):
+            return INFEASIBLE
+    _answer(gains, seen, program, x, relaxed, memory, out)
+    return GOES_ON
 
-    columns: tuple[Block, ...] = (
-        vector("slack", "m_per_s"),
-        scalar("slack_roll", "rad_per_s"),
-        scalar("passivity_active"),
-        scalar("planes_active"),
-        scalar("qp_relaxed"),
-    )
 
-    def __init__(self, config: PassiveQpConfig) -> None:
-        self._c = config
-        self._planes = Planes(config.planes, config.plane_gain_per_s)
-        slack = [config.slack_weight] * 3 + [config.roll_slack_weight]
-        self._H = np.diag([config.velocity_weight] * 7 + [2.0 * w for w in slack])
-        self._f, self._free = np.zeros(11), np.full(4, np.inf)
-        self._solver = DenseQp(config.solver)
-
-    def start(self, problem: VelocityProblem) -> PassiveQpMemory:
-        """The measured motion. The solver forgets its active set."""
-        self._solver = DenseQp(self._c.solver)
-        return PassiveQpMemory(
-            qdot=problem.v.copy(), v_T=problem.kin.Jv_WT @ problem.v, p_Td=problem.kin.p_WT.copy()
-        )
-
-    def step(self, problem: VelocityProblem, memory: PassiveQpMemory) -> tuple[Resolution, PassiveQpMemory]:
-        """Joint velocities for one period."""
-        program = self._program(problem, *braking_bounds(problem, memory.qdot))
-        x, relaxed = self._solve(program), 0.0
-        if x is None:
-            program, relaxed = self._program(problem, problem.lower, problem.upper), 1.0
-            x = self._solve(program)
-        if x is None:
-            raise ControlFailure(
-                Outcome.INFEASIBLE,
-                f"QP: no joint velocity meets the RCM, {len(self._planes)} planes, the energy budget and the "
-                "bounds",
-                {name: getattr(program, name) for name in program.__slots__},
-            )
-        return self._answer(problem, memory, program, x, relaxed)
-
-    def _solve(self, p: _Program) -> Array | None:
-        return self._solver.solve(p.H, p.f, p.lower, p.upper, p.G, p.G_lower, p.G_upper)
-
-    def _program(self, problem: VelocityProblem, lower: Array, upper: Array) -> _Program:
-        kin, rcm, c = problem.kin, problem.rcm, self._c
-        walls, room = self._planes.rows(kin)
-        f_T, most = self._budget(problem)
-        v_d = problem.command.v_WTd - c.k_tip * problem.tip_error
-        shaft = _NO_SHAFT if rcm is None else rcm.jacobian
-        v_rcm = _NO_SPEED if rcm is None else rcm.trocar_velocity - c.k_rcm * rcm.error
-        G, G_lower, G_upper = _rows(
-            kin.Jv_WT,
-            kin.Jw_WT,
-            kin.R_WT,
-            shaft,
-            f_T,
-            walls,
-            v_d,
-            problem.command.roll_rate,
-            v_rcm,
-            most,
-            room,
-            c.tip_speed_max_m_per_s,
-        )
-        return _Program(
-            H=self._H,
-            f=self._f,
-            lower=np.concatenate((lower, -self._free)),
-            upper=np.concatenate((upper, self._free)),
-            G=G,
-            G_lower=G_lower,
-            G_upper=G_upper,
-        )
-
-    def _budget(self, problem: VelocityProblem) -> tuple[Array, float]:
-        """Force on the tip (3,) [N] and the power that it may give away [W]; infinite without a budget."""
-        budget = problem.command.budget
-        if budget is None or not self._c.passivity:
-            return NO_FORCE, np.inf
-        return budget.f_T, self._c.budget_share * max(budget.most_j, 0.0) / problem.dt_s
-
-    def _answer(
-        self, problem: VelocityProblem, memory: PassiveQpMemory, program: _Program, x: Array, relaxed: float
-    ) -> tuple[Resolution, PassiveQpMemory]:
-        kin, told = problem.kin, problem.command
-        qdot, v_T, a_T, p_Td, residual, values = _finish(
-            x,
-            problem.lower,
-            problem.upper,
-            kin.Jv_WT,
-            kin.p_WT,
-            memory.v_T,
-            memory.p_Td,
-            problem.dt_s,
-            self._c.lead_max_m,
-            program.G,
-            program.G_upper,
-            len(self._planes),
-            relaxed,
-        )
-        command = TipCommand(p_WTd=memory.p_Td, v_WTd=v_T, a_WTd=a_T, roll_rate=told.roll_rate, jaw=told.jaw)
-        resolution = Resolution(qdot=qdot, residual=residual, command=command, values=values)
-        return resolution, PassiveQpMemory(qdot=qdot, v_T=v_T, p_Td=p_Td)
+def _solved_in_python(solver: Solver, gains: Array, seen: Seen, memory: Array, out: Resolved) -> int:
+    """The law of `passive_qp` by another solver."""
+    _begin(seen, memory)
+    program, relaxed = passive_program(gains, seen, memory, True), 0.0
+    x = solver(program)
+    if x is None:
+        program, relaxed = passive_program(gains, seen, memory, False), 1.0
+        x = solver(program)
+    if x is None:
+        return INFEASIBLE
+    _answer(gains, seen, program, x, relaxed, memory, out)
+    return GOES_ON
 
 
 @compiled
-def _finish(
-    x: Array,
-    lower: Array,
-    upper: Array,
-    J: Array,
-    p: Array,
-    v_last: Array,
-    p_Td: Array,
-    dt: float,
-    lead_max: float,
-    G: Array,
-    G_upper: Array,
-    walls: int,
-    relaxed: float,
-) -> tuple[Array, Array, Array, Array, float, Array]:
-    """Joint and tip velocity, tip acceleration, next tip reference, residual, values of the columns (7,).
+def _begin(seen: Seen, memory: Array) -> None:
+    """The memory before the first tick: the measured motion."""
+    n = seen.q.size
+    if seen.first != 0:
+        memory[:n] = seen.v
+        times(seen.Jv_WT, seen.v, memory[n : n + 3])
+        memory[n + 3 : n + 6] = seen.p_WT
+
+
+@compiled
+def passive_program(gains: Array, seen: Seen, memory: Array, braking: bool) -> Program:
+    """The program over (q', s), with the bounds of acceleration or without them.
+
+    Rows: tip, roll, shaft, budget, walls, speed.
+    """
+    n, m, walls = seen.q.size, seen.rows, (gains.size - WALLS) // 4
+    rows, size = 8 + m + walls, n + _SLACKS
+    H, f = np.zeros((size, size)), np.zeros(size)
+    lower, upper = np.full(size, -np.inf), np.full(size, np.inf)
+    G, low, high = np.zeros((rows, size)), np.full(rows, -np.inf), np.empty(rows)
+    lower[:n], upper[:n] = seen.lower, seen.upper
+    if braking:
+        fill_braking(seen, memory[:n], lower[:n], upper[:n])
+    for j in range(size):
+        H[j, j] = gains[WEIGHT] if j < n else 2.0 * gains[SLACK if j < size - 1 else ROLL_SLACK]
+    for i in range(3):
+        G[i, :n] = seen.Jv_WT[i]
+        low[i] = high[i] = seen.v_WTd[i] - gains[K_TIP] * (seen.p_WT[i] - seen.p_WTd[i])
+        G[rows - 3 + i, :n] = seen.Jv_WT[i]
+        low[rows - 3 + i], high[rows - 3 + i] = -gains[SPEED], gains[SPEED]
+        for j in range(n):
+            G[3, j] += seen.R_WT[i, 2] * seen.Jw_WT[i, j]
+    low[3] = high[3] = seen.roll_rate
+    for i in range(_SLACKS):
+        G[i, n + i] = -1.0
+    for i in range(m):
+        G[4 + i, :n] = seen.J_rcm[i]
+        low[4 + i] = high[4 + i] = seen.rcm_velocity[i] - gains[K_RCM] * seen.rcm_error[i]
+    high[4 + m] = np.inf
+    if gains[SHARE] > 0.0 and math.isfinite(seen.budget_j):
+        high[4 + m] = gains[SHARE] * max(seen.budget_j, 0.0) / seen.dt_s
+        for j in range(n):
+            for i in range(3):
+                G[4 + m, j] -= seen.budget_f_T[i] * seen.Jv_WT[i, j]
+    fill_plane_rows(gains[WALLS:], gains[WALL_GAIN], seen, G[5 + m :], high[5 + m : 5 + m + walls])
+    return H, f, lower, upper, G, low, high
+
+
+@compiled
+def _answer(
+    gains: Array, seen: Seen, program: Program, x: Array, relaxed: float, memory: Array, out: Resolved
+) -> None:
+    """The answer inside Omega, the motion that the torque law follows, the columns' values, the memory.
 
     The row of the energy budget and those of the walls are active where they are at their bound.
     """
-    qdot = np.minimum(np.maximum(x[:7], lower), upper)
-    v_T = J @ qdot
-    lead = p_Td - p
-    length = max(math.sqrt(lead @ lead), lead_max)
-    values = np.zeros(7)
-    values[:4] = x[7:]
-    budget = G.shape[0] - 4 - walls
-    for i in range(budget, budget + 1 + walls):
-        at = 0.0
-        for j in range(11):
-            at += G[i, j] * x[j]
-        if at >= G_upper[i] - _ACTIVE:
-            values[4 if i == budget else 5] += 1.0
-    values[6] = relaxed
-    residual = math.sqrt(x[7] * x[7] + x[8] * x[8] + x[9] * x[9])
-    return qdot, v_T, (v_T - v_last) / dt, p + lead * (lead_max / length) + dt * v_T, residual, values
+    n = seen.q.size
+    G, most = program[4], program[6]
+    last, v_T, p_Td = memory[:n], memory[n : n + 3], memory[n + 3 : n + 6]
+    for j in range(n):
+        last[j] = out.qdot[j] = min(max(x[j], seen.lower[j]), seen.upper[j])
+    lead = np.empty(3)
+    for i in range(3):
+        out.p_WTd[i], out.a_WTd[i] = p_Td[i], v_T[i]
+        lead[i] = p_Td[i] - seen.p_WT[i]
+    times(seen.Jv_WT, last, v_T)
+    kept = gains[LEAD] / max(norm(lead), gains[LEAD])
+    for i in range(3):
+        out.v_WTd[i] = v_T[i]
+        out.a_WTd[i] = (v_T[i] - out.a_WTd[i]) / seen.dt_s
+        p_Td[i] = seen.p_WT[i] + lead[i] * kept + seen.dt_s * v_T[i]
+    out.values[:_SLACKS] = x[n:]
+    out.values[_BUDGET], out.values[_WALLS], out.values[_RELAXED] = 0.0, 0.0, relaxed
+    budget = _SLACKS + seen.rows
+    for i in range(budget, most.size - 3):
+        if dot(G[i], x) >= most[i] - _ACTIVE:
+            out.values[_BUDGET if i == budget else _WALLS] += 1.0
+    out.residual = norm(x[n : n + 3])
 
 
-@compiled
-def _rows(
-    Jv: Array,
-    Jw: Array,
-    R: Array,
-    shaft: Array,
-    f_T: Array,
-    walls: Array,
-    v_d: Array,
-    roll_rate: float,
-    v_rcm: Array,
-    most_w: float,
-    room: Array,
-    speed: float,
-) -> tuple[Array, Array, Array]:
-    """Rows (m + n + 8, 11) over (q', s) and their bounds: tip and roll, shaft, budget, walls, speed."""
-    m, n = shaft.shape[0], walls.shape[0]
-    G = np.zeros((m + n + 8, 11))
-    low, high = np.full(m + n + 8, -np.inf), np.empty(m + n + 8)
-    G[:3, :7] = G[m + n + 5 :, :7] = Jv
-    low[:3] = high[:3] = v_d
-    low[3] = high[3] = roll_rate
-    low[4 : 4 + m] = high[4 : 4 + m] = v_rcm
-    for j in range(7):
-        for i in range(3):
-            G[3, j] += R[i, 2] * Jw[i, j]
-            G[4 + m, j] -= f_T[i] * Jv[i, j]
-    for i in range(4):
-        G[i, 7 + i] = -1.0
-    G[4 : 4 + m, :7] = shaft
-    high[4 + m] = most_w
-    G[5 + m : 5 + m + n, :7] = walls
-    high[5 + m : 5 + m + n] = room
-    low[m + n + 5 :] = -speed
-    high[m + n + 5 :] = speed
-    return G, low, high
+def _examine(gains: Array, seen: Seen, memory: Array) -> Mapping[str, Array]:
+    return examined(passive_program(gains, seen, memory, False))

@@ -1,5 +1,6 @@
 """QP: inverse kinematics as a convex program with the RCM as a hard constraint."""
 
+from collections.abc import Mapping
 from typing import Annotated, Literal
 
 import numpy as np
@@ -7,37 +8,29 @@ from numpy.typing import NDArray
 from pydantic import AfterValidator, NonNegativeFloat, PositiveFloat
 
 from surgsim.catalog import PartConfig
-from surgsim.control.failure import ControlFailure
-from surgsim.control.manipulability import log_manipulability_gradient
-from surgsim.control.planes import PlaneConfig, Planes
-from surgsim.control.problem import (
-    Resolution,
-    VelocityProblem,
-    bounded_resolution,
-    braking_bounds,
-    stacked_rows,
+from surgsim.compiled import compiled
+from surgsim.control.manipulability import fill_log_manipulability_gradient
+from surgsim.control.planes import PlaneConfig, fill_plane_rows, plane_numbers
+from surgsim.control.resolvers.base import KernelResolver
+from surgsim.control.resolvers.program import (
+    OWN,
+    Program,
+    SolvedInPython,
+    Solver,
+    check_solver,
+    examined,
+    solve_warm,
 )
-from surgsim.control.qp import SHIPPED, DenseQp
-from surgsim.errors import Outcome, unknown_name
+from surgsim.control.resolvers.rows import answer, fill_braking, task_rows
 from surgsim.models.arm import ArmModel
+from surgsim.tick.arrays import Resolved, Seen
+from surgsim.tick.status import GOES_ON, INFEASIBLE, RANK_LOST
 
 Array = NDArray[np.float64]
 
-
-def check_backend(name: str) -> str:
-    """`name`, if there is such a solver here.
-
-    Raises:
-        ValueError: If there is not.
-    """
-    if name in SHIPPED:
-        return name
-    import qpsolvers  # half a second, and only the other back ends need it
-
-    known = sorted({*SHIPPED, *qpsolvers.available_solvers})
-    if name not in known:
-        raise ValueError(unknown_name(name, "QP solver installed here", known))
-    return name
+WEIGHT, SLACK, CLIMB, SOFT, K_TIP, K_RCM, LIMITED, WALL_GAIN, WALLS = range(9)
+"""Gains: w, w_s, w_mu, rows with a slack, k_tip, k_rcm, limited acceleration, walls' gain, first wall."""
+_TASK_ROWS = 5
 
 
 class QpConfig(PartConfig):
@@ -53,7 +46,7 @@ class QpConfig(PartConfig):
         acceleration_limit: Whether joint accelerations are limited too.
         planes: Virtual walls of the workspace.
         plane_gain_per_s: How fast the tip may approach a wall [1/s].
-        solver: `daqp`, `osqp`, or another solver that qpsolvers finds installed, by its name.
+        solver: `active_set`, `daqp`, `osqp`, or another solver that qpsolvers finds installed, by its name.
     """
 
     type: Literal["qp"] = "qp"
@@ -66,15 +59,31 @@ class QpConfig(PartConfig):
     acceleration_limit: bool = True
     planes: tuple[PlaneConfig, ...] = ()
     plane_gain_per_s: PositiveFloat = 20.0
-    solver: Annotated[str, AfterValidator(check_backend)] = "daqp"
+    solver: Annotated[str, AfterValidator(check_solver)] = OWN
 
-    def build(self, arm: ArmModel) -> "Qp":
+    def build(self, arm: ArmModel) -> KernelResolver:
         """The resolver."""
-        return Qp(self)
+        n, soft = arm.limits.q_min.size, 3 if self.tip == "soft" else 0
+        numbers = [self.velocity_weight, self.slack_weight, self.manipulability_weight, soft]
+        numbers += [self.k_tip, self.k_rcm, self.acceleration_limit, self.plane_gain_per_s]
+        walls = len(self.planes)
+
+        def without_answer(seen: Seen) -> str:
+            return f"QP: no joint velocity meets {3 + seen.rows} task rows, {walls} planes and the bounds"
+
+        return KernelResolver(
+            kernel=qp if self.solver == OWN else SolvedInPython(_solved_in_python, self.solver),
+            arm=arm,
+            gains=np.concatenate((np.array(numbers, dtype=np.float64), plane_numbers(self.planes))),
+            memory_size=2 * n + soft + _TASK_ROWS + walls,
+            failures={INFEASIBLE: without_answer},
+            examine=_examine,
+        )
 
 
-class Qp:
-    """min 1/2 q'^T W q' + s^T W_s s - w q' . grad(ln mu), over joint velocities q' and slack s.
+@compiled
+def qp(gains: Array, seen: Seen, memory: Array, out: Resolved) -> int:
+    """Minimise 1/2 q'^T W q' + s^T W_s s - w q' . grad(ln mu), over joint velocities q' and slack s.
 
         J_T q' = v_d + s                        tip, soft (s = 0 when hard)
         J_rcm q' = -K_rcm e + N C'              RCM, hard: never relaxed
@@ -82,64 +91,76 @@ class Qp:
         n . J_T q' <= gain (offset - n . p)     workspace planes
 
     Where the bounds of acceleration and Omega exclude each other, Omega holds. An infeasible program is the
-    outcome INFEASIBLE with its matrices attached, never a silent zero.
+    outcome INFEASIBLE with its matrices attached, never a silent zero. Memory: the last q', the measured one
+    at first, and the sides of the last solution.
 
     Source: passive convex teleoperation paper, sections 1.1-1.3; `passive_qp` is the whole of it.
     """
+    n = seen.q.size
+    last = memory[:n]
+    if seen.first != 0:
+        last[:] = seen.v
+    ranked, program = qp_program(gains, seen, last)
+    if not ranked:
+        return RANK_LOST
+    x = np.empty(program[1].size)
+    if not solve_warm(program, memory[n : n + x.size + program[5].size], x):
+        return INFEASIBLE
+    _answer(gains, seen, x, last, out)
+    return GOES_ON
 
-    def __init__(self, config: QpConfig) -> None:
-        self._c = config
-        self._planes = Planes(config.planes, config.plane_gain_per_s)
-        soft = 3 if config.tip == "soft" else 0
-        self._H = np.diag([config.velocity_weight] * 7 + [2.0 * config.slack_weight] * soft)
-        self._free = np.full(soft, np.inf)
-        self._solver = DenseQp(config.solver)
 
-    def start(self, problem: VelocityProblem) -> Array:
-        """The last joint velocity (7,): the measured one. The solver forgets its active set."""
-        self._solver = DenseQp(self._c.solver)
-        return problem.v.copy()
+def _solved_in_python(solver: Solver, gains: Array, seen: Seen, memory: Array, out: Resolved) -> int:
+    """The law of `qp` by another solver."""
+    last = memory[: seen.q.size]
+    if seen.first:
+        last[:] = seen.v
+    ranked, program = qp_program(gains, seen, last)
+    if not ranked:
+        return RANK_LOST
+    x = solver(program)
+    if x is None:
+        return INFEASIBLE
+    _answer(gains, seen, x, last, out)
+    return GOES_ON
 
-    def step(self, problem: VelocityProblem, memory: Array) -> tuple[Resolution, Array]:
-        """Joint velocities for one period."""
-        J, v = stacked_rows(problem, self._c.k_tip, self._c.k_rcm)
-        lower, upper = self._bounds(problem, memory)
-        program = self._program(problem, J, v, lower, upper)
-        x = self._solver.solve(*program.values())
-        if x is None:
-            raise ControlFailure(
-                Outcome.INFEASIBLE,
-                f"QP: no joint velocity meets {len(v)} task rows, {len(self._planes)} planes and the bounds",
-                program,
-            )
-        resolution = bounded_resolution(problem, x[:7], J, v)
-        return resolution, resolution.qdot
 
-    def _bounds(self, problem: VelocityProblem, last: Array) -> tuple[Array, Array]:
-        if not self._c.acceleration_limit:
-            return problem.lower, problem.upper
-        return braking_bounds(problem, last)
+@compiled
+def _answer(gains: Array, seen: Seen, x: Array, last: Array, out: Resolved) -> None:
+    """The program's answer inside Omega, which is remembered."""
+    J, v = task_rows(seen, gains[K_TIP], gains[K_RCM], True)
+    answer(seen, x[: seen.q.size], J, v, out)
+    last[:] = out.qdot
 
-    def _program(
-        self, problem: VelocityProblem, J: Array, v: Array, lower: Array, upper: Array
-    ) -> dict[str, Array]:
-        """H, f, bounds and rows of the program, in the order of `DenseQp.solve`."""
-        soft = len(self._free)
-        f = np.zeros(7 + soft)
-        if self._c.manipulability_weight:
-            gradient = log_manipulability_gradient(problem.kin.Jv_WT, problem.kin.z_W)
-            f[:7] = -self._c.manipulability_weight * gradient
-        walls, room = self._planes.rows(problem.kin)
-        G = np.zeros((len(v) + len(room), 7 + soft))
-        G[: len(v), :7] = J
-        G[:soft, 7:] = -np.eye(soft)
-        G[len(v) :, :7] = walls
-        return {
-            "H": self._H,
-            "f": f,
-            "lower": np.concatenate((lower, -self._free)),
-            "upper": np.concatenate((upper, self._free)),
-            "G": G,
-            "G_lower": np.concatenate((v, np.full(len(room), -np.inf))),
-            "G_upper": np.concatenate((v, room)),
-        }
+
+@compiled
+def qp_program(gains: Array, seen: Seen, last: Array) -> tuple[bool, Program]:
+    """The program over (q', s) after the last joint velocity `last` (n,); False where J_T has lost rank."""
+    n, soft = seen.q.size, int(gains[SOFT])
+    J, v = task_rows(seen, gains[K_TIP], gains[K_RCM], True)
+    rows, walls = v.size, (gains.size - WALLS) // 4
+    H, f = np.zeros((n + soft, n + soft)), np.zeros(n + soft)
+    lower, upper = np.full(n + soft, -np.inf), np.full(n + soft, np.inf)
+    G, low = np.zeros((rows + walls, n + soft)), np.full(rows + walls, -np.inf)
+    high = np.empty(rows + walls)
+    lower[:n], upper[:n] = seen.lower, seen.upper
+    if gains[LIMITED] != 0.0:
+        fill_braking(seen, last, lower[:n], upper[:n])
+    for j in range(n + soft):
+        H[j, j] = gains[WEIGHT] if j < n else 2.0 * gains[SLACK]
+    ranked = True
+    if gains[CLIMB] != 0.0:
+        ranked = fill_log_manipulability_gradient(seen.Jv_WT, seen.z_W, f[:n])
+        for j in range(n):
+            f[j] *= -gains[CLIMB]
+    G[:rows, :n] = J
+    for i in range(soft):
+        G[i, n + i] = -1.0
+    low[:rows] = v
+    high[:rows] = v
+    fill_plane_rows(gains[WALLS:], gains[WALL_GAIN], seen, G[rows:], high[rows:])
+    return ranked, (H, f, lower, upper, G, low, high)
+
+
+def _examine(gains: Array, seen: Seen, memory: Array) -> Mapping[str, Array]:
+    return examined(qp_program(gains, seen, memory[: seen.q.size])[1])

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surgsim.compiled import compiled
+from surgsim.control.bounds import fill_braking_bounds
 from surgsim.tick.arrays import Resolved, Seen
 
 Array = NDArray[np.float64]
@@ -42,3 +43,21 @@ def answer(seen: Seen, qdot: Array, J: Array, v: Array, out: Resolved) -> None:
             row += J[i, j] * out.qdot[j]
         total += row * row
     out.residual = math.sqrt(total)
+
+
+@compiled
+def fill_braking(seen: Seen, last: Array, low: Array, high: Array) -> None:
+    """Omega with acceleration limits after the last joint velocity `last` (n,), see `fill_braking_bounds`."""
+    fill_braking_bounds(
+        seen.q,
+        last,
+        seen.lower,
+        seen.upper,
+        seen.q_min,
+        seen.q_max,
+        seen.a_max,
+        seen.omega_gain,
+        seen.dt_s,
+        low,
+        high,
+    )

@@ -2,18 +2,18 @@
 
 from dataclasses import replace
 from time import perf_counter
-from typing import Any
 
 import numpy as np
 
-from surgsim.columns import Block, scalar
-from surgsim.control.problem import Resolution, VelocityProblem
-from surgsim.control.resolvers.passive_qp import PassiveQp, PassiveQpConfig, PassiveQpMemory
+from surgsim.columns import scalar
+from surgsim.control.resolvers.base import KernelResolver
+from surgsim.control.resolvers.passive_qp import PassiveQpConfig
 from surgsim.models.arm import ArmModel
 from surgsim.scenario.schema import Scenario
 from surgsim.simulate.loop import simulate
 from surgsim.studies.passive_teleoperation.cases import Shipped
 from surgsim.studies.study import Row
+from surgsim.tick.arrays import Array, Resolved, Seen
 
 WARM_TICKS = 100
 QP_LIMIT_US = 200.0
@@ -22,28 +22,18 @@ QP_LIMIT_US = 200.0
 class TimedQpConfig(PassiveQpConfig):
     """`passive_qp` whose trace has the time of each step as `qp_time_s`."""
 
-    def build(self, arm: ArmModel) -> Any:
-        """The resolver."""
-        return _TimedQp(super().build(arm))
+    def build(self, arm: ArmModel) -> KernelResolver:
+        """The resolver, its kernel called from Python."""
+        inner = super().build(arm)
+        last = sum(len(block.columns) for block in inner.columns)
 
+        def kernel(gains: Array, seen: Seen, memory: Array, out: Resolved) -> int:
+            began = perf_counter()
+            status = inner.kernel(gains, seen, memory, out)
+            out.values[last] = perf_counter() - began
+            return status
 
-class _TimedQp:
-    """A resolver with the time of its step as a further column."""
-
-    def __init__(self, inner: PassiveQp) -> None:
-        self._inner = inner
-        self.columns: tuple[Block, ...] = (*inner.columns, scalar("qp_time", "s"))
-
-    def start(self, problem: VelocityProblem) -> PassiveQpMemory:
-        """As the resolver."""
-        return self._inner.start(problem)
-
-    def step(self, problem: VelocityProblem, memory: PassiveQpMemory) -> tuple[Resolution, PassiveQpMemory]:
-        """As the resolver, timed."""
-        began = perf_counter()
-        resolution, memory = self._inner.step(problem, memory)
-        took = perf_counter() - began
-        return replace(resolution, values=np.append(resolution.values, took)), memory
+        return replace(inner, kernel=kernel, columns=(*inner.columns, scalar("qp_time", "s")))
 
 
 def timed(scenario: Scenario) -> Scenario:

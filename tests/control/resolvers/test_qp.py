@@ -12,7 +12,7 @@ from surgsim.contract import problems
 from surgsim.control.failure import ControlFailure
 from surgsim.control.planes import PlaneConfig
 from surgsim.control.qp import SHIPPED
-from surgsim.control.resolvers.qp import Qp, QpConfig
+from surgsim.control.resolvers.qp import QpConfig
 from surgsim.control.resolvers.vprnn import VprnnConfig
 from surgsim.errors import Outcome
 from surgsim.runs.folder import run_to_folder
@@ -23,10 +23,9 @@ seeds = pytest.mark.parametrize("seed", range(5))
 trocar_or_none = pytest.mark.parametrize("trocar", [True, False])
 
 
-def _step(config, p, last=None):
-    resolver = Qp(config)
-    memory = resolver.start(p)
-    return resolver.step(p, memory if last is None else last)[0]
+def _step(config, p):
+    resolver = config.build(problems.arm())
+    return resolver.step(p, resolver.start(p))[0]
 
 
 def _wanted(p, k=5.0):
@@ -175,20 +174,19 @@ def test_joint_accelerations_are_limited_when_asked_to(scenario, limit):
 def test_the_memory_is_the_last_velocity_and_starts_at_the_measured_one(velocity_problem):
     p = velocity_problem(0, rcm_error_m=0.0, trocar_speed=0.0)
     p = replace(p, v=p.v - np.linalg.pinv(p.rcm.jacobian) @ p.rcm.jacobian @ p.v)
-    resolver = Qp(QpConfig())
-    memory = resolver.start(p)
-    np.testing.assert_array_equal(memory, p.v)
-    answer, after = resolver.step(p, memory)
-    np.testing.assert_array_equal(after, answer.qdot)
+    resolver = QpConfig().build(problems.arm())
+    answer, memory = resolver.step(p, resolver.start(p))
+    np.testing.assert_array_equal(memory[:7], answer.qdot)
     assert (np.abs(answer.qdot - p.v) <= p.limits.acceleration * p.dt_s * (1 + 1e-9)).all()
 
 
 @seeds
 @pytest.mark.parametrize("speed", [0.05, 0.5])
-def test_both_solvers_give_the_same_velocities(velocity_problem, seed, speed):
+def test_every_shipped_solver_gives_the_same_velocities(velocity_problem, seed, speed):
     p = velocity_problem(seed, speed=speed, rcm_error_m=0.001)
-    daqp, osqp = (_step(QpConfig(solver=s, acceleration_limit=False), p).qdot for s in SHIPPED)
-    np.testing.assert_allclose(osqp, daqp, atol=1e-7)
+    ours, *others = (_step(QpConfig(solver=s, acceleration_limit=False), p).qdot for s in SHIPPED)
+    for other in others:
+        np.testing.assert_allclose(other, ours, atol=1e-7)
 
 
 def test_an_unknown_solver_is_refused_with_the_nearest_match():
@@ -196,10 +194,22 @@ def test_an_unknown_solver_is_refused_with_the_nearest_match():
         QpConfig(solver="daqpp")
 
 
-def test_an_infeasible_program_is_an_outcome_with_its_matrices(velocity_problem):
+def test_the_kernel_is_the_same_without_its_decorator(velocity_problem):
+    """Compiled code inside, the law itself as Python."""
+    p = velocity_problem(0, speed=0.5, rcm_error_m=0.001)
+    resolver = QpConfig(acceleration_limit=False).build(problems.arm())
+    answer, memory = resolver.step(p, None)
+    plain, remembered = replace(resolver, kernel=resolver.kernel.py_func).step(p, None)
+    np.testing.assert_array_equal(plain.qdot, answer.qdot)
+    np.testing.assert_array_equal(remembered, memory)
+
+
+@pytest.mark.parametrize("solver", SHIPPED)
+def test_an_infeasible_program_is_an_outcome_with_its_matrices(velocity_problem, solver):
     p = velocity_problem(0, speed=50.0)
-    with pytest.raises(ControlFailure, match="no joint velocity meets 5 task rows, 0 planes") as failure:
-        _step(QpConfig(tip="hard", acceleration_limit=False), p)
+    text = "^QP: no joint velocity meets 5 task rows, 0 planes and the bounds$"
+    with pytest.raises(ControlFailure, match=text) as failure:
+        _step(QpConfig(tip="hard", acceleration_limit=False, solver=solver), p)
     assert failure.value.outcome is Outcome.INFEASIBLE
     data = failure.value.data
     np.testing.assert_array_equal(data["G"], np.vstack([p.kin.Jv_WT, p.rcm.jacobian]))
