@@ -1,6 +1,7 @@
 """Shared fixtures: the arm, random problems for resolvers and torque laws, short scenarios, traces."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,7 @@ from surgsim.errors import Outcome
 from surgsim.models.arm import ArmModel
 from surgsim.scenario.load import load_scenario
 from surgsim.scenario.schema import Scenario
+from surgsim.simulate.setup import Setup
 from surgsim.trace.trace import BASE_BLOCKS, Ending, Trace, TraceMeta
 
 pytest_plugins = ["left_out"]
@@ -59,6 +61,33 @@ def scenario() -> Callable[..., Scenario]:
         return load_scenario(
             "circle_lwr4plus", controller=controller, assignments=[*SHORT, *assignments], seed=seed
         )
+
+    return make
+
+
+class _Asked:
+    """A resolver in Python that is asked first, and then does what the resolver in its place did."""
+
+    def __init__(self, inner: Any, before: Callable[[int, VelocityProblem], None]) -> None:
+        self.inner, self.columns, self.before, self.count = inner, inner.columns, before, -1
+
+    def start(self, problem: VelocityProblem) -> Any:
+        return self.inner.start(problem)
+
+    def step(self, problem: VelocityProblem, memory: Any) -> Any:
+        self.count += 1
+        self.before(self.count, problem)
+        return self.inner.step(problem, memory)
+
+
+@pytest.fixture(scope="session")
+def asking() -> Callable[..., Setup]:
+    """Factory of setups whose resolver calls `before(tick, problem)` first, which may raise."""
+
+    def make(setup: Setup, before: Callable[[int, VelocityProblem], None]) -> Setup:
+        parts = setup.controller.parts
+        asked = replace(parts, resolver=_Asked(parts.resolver, before))
+        return replace(setup, controller=setup.controller.with_parts(asked))
 
     return make
 

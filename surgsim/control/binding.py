@@ -20,7 +20,7 @@ from surgsim.errors import Outcome
 from surgsim.models.arm import ArmModel
 from surgsim.tick.arrays import Control, law_signature, new, resolver_signature
 from surgsim.tick.python_part import PythonPart, python_kernel
-from surgsim.tick.status import TOLD
+from surgsim.tick.status import INFEASIBLE, RANK_LOST, TOLD
 
 Array = NDArray[np.float64]
 
@@ -114,8 +114,8 @@ class Bound:
             BaseException: What a Python part raised, if that is no failure of a controller.
         """
         who, c = int(self.control.who), self.control
-        if status == TOLD:
-            error = self.entered[who].raised()
+        error = self.entered[who].raised() if who in self.entered else None
+        if status == TOLD or error is not None:
             if isinstance(error, ControlFailure):
                 return error
             if isinstance(error, np.linalg.LinAlgError):
@@ -133,6 +133,14 @@ class Bound:
         return failure_of(status, {}, {"q": seen.q.copy()})
 
 
+def _status_of(error: BaseException) -> int:
+    """The status of a tick in which a part in Python raised `error`."""
+    if isinstance(error, np.linalg.LinAlgError):
+        return RANK_LOST
+    infeasible = isinstance(error, ControlFailure) and error.outcome is Outcome.INFEASIBLE
+    return INFEASIBLE if infeasible else TOLD
+
+
 def bind(parts: ControllerParts, control: Any, arm: ArmModel) -> Bound:
     """Join the parts to the record of a tick; those that are no compiled kernel are entered in Python."""
     entered: dict[int, PythonPart] = {}
@@ -144,7 +152,7 @@ def bind(parts: ControllerParts, control: Any, arm: ArmModel) -> Bound:
         if _is_compiled(part):
             return as_parameter(part.kernel, signature)
         if part is not None:
-            entered[who] = PythonPart(call)
+            entered[who] = PythonPart(call, _status_of)
             gains[:] = entered[who].gains
         return as_parameter(python_kernel, signature)
 

@@ -1,5 +1,6 @@
 """A controller: a resolver, a torque law, and the integrated joint reference between them."""
 
+from copy import copy
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -88,42 +89,56 @@ class Controller:
         control: The record that `decide` works on.
         minds: The parts' numbers and memories.
         kernels: Port estimator, resolver and torque law.
+        parts: Port estimator, resolver and torque law as their configs build them.
         estimates: Whether the trocar's place is estimated rather than taken as seen.
     """
 
     def __init__(
         self, config: ControllerConfig, arm: ArmModel, *, dt_s: float, has_trocar: bool, use_torque_law: bool
     ) -> None:
-        self._arm = arm
-        self._parts = ControllerParts(
-            port=config.port.build(arm),
-            resolver=config.resolver.build(arm),
-            law=config.torque_law.build(arm) if use_torque_law and config.torque_law else None,
+        self._config, self._arm, self._dt, self._has_trocar = config, arm, dt_s, has_trocar
+        self._join(
+            ControllerParts(
+                port=config.port.build(arm),
+                resolver=config.resolver.build(arm),
+                law=config.torque_law.build(arm) if use_torque_law and config.torque_law else None,
+            )
         )
-        self.estimates = has_trocar and getattr(self._parts.port, "estimates", True)
+
+    def _join(self, parts: ControllerParts) -> None:
+        """Join the parts to new records."""
+        arm, config, has_trocar = self._arm, self._config, self._has_trocar
+        self.parts = parts
+        self.estimates = has_trocar and getattr(self.parts.port, "estimates", True)
         self.control = new_control(
             arm,
-            dt_s=dt_s,
+            dt_s=self._dt,
             has_trocar=has_trocar,
-            has_law=self._parts.law is not None,
+            has_law=self.parts.law is not None,
             omega_gain=config.position_gain_per_s,
             at_reference=config.evaluate_at == "reference",
         )
-        self._bound = bind(self._parts, self.control, arm)
+        self._bound = bind(self.parts, self.control, arm)
         self.kernels, self.minds = self._bound.kernels, self._bound.minds
         self._decide = as_parameter(decide, decide_signature(arm.limits.q_min.size))
         self.reset()
 
+    def with_parts(self, parts: ControllerParts) -> "Controller":
+        """The same controller with other parts."""
+        other = copy(self)
+        other._join(parts)
+        return other
+
     @property
     def terms(self) -> tuple[str, ...]:
         """Names of the torque law's terms."""
-        return self._parts.terms
+        return self.parts.terms
 
     @property
     def columns(self) -> tuple[Block, ...]:
         """What resolver and port estimator add to the trace."""
         port = (vector("trocar_estimate", "m"),) if self.estimates else ()
-        return (*self._parts.columns, *port)
+        return (*self.parts.columns, *port)
 
     def reset(self) -> None:
         """Forget everything: the next tick is the first."""
@@ -151,7 +166,7 @@ class Controller:
 
     def _output(self) -> ControlOutput:
         c, out = self.control, self.control.resolved
-        own = out.values[: sum(len(block.columns) for block in self._parts.columns)].copy()
+        own = out.values[: sum(len(block.columns) for block in self.parts.columns)].copy()
         resolution = Resolution(
             qdot=out.qdot.copy(), residual=float(out.residual), command=command_of(c.seen), values=own
         )

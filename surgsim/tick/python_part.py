@@ -27,14 +27,17 @@ class PythonPart:
 
     Args:
         call: What is called each time; it returns a status, or None for `GOES_ON`.
+        status_of: The status that stands for an exception; `TOLD` unless given.
 
     Attributes:
         gains: The trampoline's gains: the address of the C function (1,).
         error: What `call` raised, until it is taken by `raised`.
     """
 
-    def __init__(self, call: Callable[[], int | None]) -> None:
-        self._call = call
+    def __init__(
+        self, call: Callable[[], int | None], status_of: Callable[[BaseException], int] = lambda _: TOLD
+    ) -> None:
+        self._call, self._status_of = call, status_of
         self._entry = _CALL(self._enter)
         address = ctypes.cast(self._entry, ctypes.c_void_p).value
         self.gains: Array = np.array([address], dtype=np.int64).view(np.float64)
@@ -45,7 +48,7 @@ class PythonPart:
             status = self._call()
         except BaseException as error:  # an exception that leaves here is printed and lost
             self.error = error
-            return TOLD
+            return self._status_of(error)
         return GOES_ON if status is None else int(status)
 
     def raised(self) -> BaseException | None:

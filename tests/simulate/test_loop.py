@@ -28,15 +28,9 @@ def test_the_same_scenario_gives_the_same_trace_bit_for_bit(scenario, trace):
     assert not simulate(scenario(*PAYLOAD)).equals(trace)
 
 
-def test_control_time_is_the_controllers_and_not_what_else_the_machine_does(scenario, monkeypatch):
-    setup = prepare(scenario())
-    tick, waits = setup.controller.tick, iter([time.sleep, _work])
-
-    def slowed(state, command):
-        next(waits, lambda _: None)(0.05)
-        return tick(state, command)
-
-    monkeypatch.setattr(setup.controller, "tick", slowed)
+def test_control_time_is_the_controllers_and_not_what_else_the_machine_does(scenario, asking):
+    waits = iter([time.sleep, _work])
+    setup = asking(prepare(scenario()), lambda tick, problem: next(waits, lambda _: None)(0.05))
     slept, worked, *_ = Simulation(setup).run()["control_time_s"]
     assert slept < 0.04, "the time that the thread was not running is in it"
     assert worked >= 0.05
@@ -138,37 +132,39 @@ def test_a_control_period_that_is_no_multiple_of_the_timestep_is_refused(scenari
 def test_progress_is_told_with_the_whole_duration(scenario):
     told = []
     simulate(scenario(), lambda *call: told.append(call))
-    assert told == [(pytest.approx(0.25), pytest.approx(0.3))]
+    assert told[-1] == (pytest.approx(0.3), pytest.approx(0.3))
 
 
-class Failing:
-    """The controller of a setup that fails at one tick."""
+class NotFinite:
+    """A torque law in Python whose torque is not finite at one tick."""
 
-    def __init__(self, inner, tick, answer):
-        self.inner, self.terms, self.columns = inner, inner.terms, inner.columns
-        self.tick_number, self.answer = tick, answer
+    terms = ("joint",)
 
-    def reset(self):
-        self.inner.reset()
-        self.count = 0
+    def __init__(self, tick):
+        self.count, self.tick = -1, tick
 
-    def tick(self, state, command):
+    def start(self, problem):
+        return None
+
+    def torque(self, problem, memory):
         self.count += 1
-        output = self.inner.tick(state, command)
-        return self.answer(output) if self.count == self.tick_number + 1 else output
+        torque = problem.dyn.bias - 5.0 * problem.v
+        return (torque if self.count != self.tick else np.full(7, np.nan))[None], None
 
 
-def _raise(output):
-    raise ControlFailure(Outcome.INFEASIBLE, "no joint velocity meets the rows")
-
-
-def _run_failing(scenario, tick, answer):
+def _run_with_law(scenario, law):
     setup = prepare(scenario())
-    return Simulation(replace(setup, controller=Failing(setup.controller, tick, answer))).run()
+    parts = replace(setup.controller.parts, law=law)
+    return Simulation(replace(setup, controller=setup.controller.with_parts(parts))).run()
 
 
-def test_a_controller_s_failure_ends_the_run_as_its_outcome(scenario):
-    trace = _run_failing(scenario, 7, _raise)
+def _raise(tick, problem):
+    if tick == 7:
+        raise ControlFailure(Outcome.INFEASIBLE, "no joint velocity meets the rows")
+
+
+def test_a_controller_s_failure_ends_the_run_as_its_outcome(scenario, asking):
+    trace = Simulation(asking(prepare(scenario()), _raise)).run()
     ending = trace.meta.ending
     assert (ending.outcome, ending.detail) == (Outcome.INFEASIBLE, "no joint velocity meets the rows")
     assert ending.t_s == pytest.approx(0.007)
@@ -182,7 +178,7 @@ def test_a_controller_s_failure_ends_the_run_as_its_outcome(scenario):
 
 @pytest.mark.parametrize("tick", [0, 5])
 def test_a_torque_that_is_not_finite_never_reaches_the_plant(scenario, tick):
-    trace = _run_failing(scenario, tick, lambda output: replace(output, torque=np.full(7, np.nan)))
+    trace = _run_with_law(scenario, NotFinite(tick))
     ending = trace.meta.ending
     assert (ending.outcome, ending.detail) == (Outcome.DIVERGED, "torque is not finite")
     assert ending.t_s == pytest.approx(0.001 * tick)
@@ -190,7 +186,7 @@ def test_a_torque_that_is_not_finite_never_reaches_the_plant(scenario, tick):
 
 
 def test_a_torque_that_is_not_finite_at_the_last_tick_is_no_completion(scenario):
-    trace = _run_failing(scenario, 300, lambda output: replace(output, torque=np.full(7, np.nan)))
+    trace = _run_with_law(scenario, NotFinite(300))
     assert trace.meta.ending.outcome is Outcome.DIVERGED
 
 

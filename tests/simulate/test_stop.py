@@ -1,7 +1,6 @@
 """Every outcome that stops a run: its shipped scenario ends in it, then the arm comes to rest and stays."""
 
 import json
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -125,32 +124,22 @@ def test_a_completed_run_is_not_stopped(scenario):
     assert trace["stopped"].tolist() == [0.0] * len(trace)
 
 
-class Failing:
-    """A controller that fails at given ticks."""
-
-    def __init__(self, inner, ticks):
-        self.inner, self.terms, self.columns, self.ticks = inner, inner.terms, inner.columns, ticks
-        self.count = -1
-
-    def reset(self):
-        self.inner.reset()
-
-    def tick(self, state, command):
-        self.count += 1
-        if self.count in self.ticks:
+def _failing_at(ticks):
+    def fail(tick, problem):
+        if tick in ticks:
             raise ControlFailure(Outcome.INFEASIBLE, "made to fail")
-        return self.inner.tick(state, command)
+
+    return fail
 
 
-def _failing(scenario, ticks, *changes):
-    setup = prepare(scenario(*changes))
-    return Simulation(replace(setup, controller=Failing(setup.controller, ticks))).run()
+def _failing(scenario, asking, ticks, *changes):
+    return Simulation(asking(prepare(scenario(*changes)), _failing_at(ticks))).run()
 
 
 @pytest.mark.parametrize("plant", ["dynamic", "kinematic"])
-def test_up_to_n_ticks_in_a_row_without_an_answer_are_bridged_by_braking(scenario, plant):
+def test_up_to_n_ticks_in_a_row_without_an_answer_are_bridged_by_braking(scenario, asking, plant):
     changes = ("safety.infeasible_ticks_max=3", f"plant.type={plant}")
-    trace = _failing(scenario, {100, 101, 102, 150}, *changes)
+    trace = _failing(scenario, asking, {100, 101, 102, 150}, *changes)
     assert trace.meta.ending.outcome is Outcome.COMPLETED
     assert compute_metrics(trace)["infeasible_ticks"] == 4
     assert np.flatnonzero(trace["infeasible"]).tolist() == [100, 101, 102, 150]
@@ -158,27 +147,24 @@ def test_up_to_n_ticks_in_a_row_without_an_answer_are_bridged_by_braking(scenari
     assert during < before
 
 
-def test_the_controller_takes_over_from_the_brake_without_a_kick(scenario):
+def test_the_controller_takes_over_from_the_brake_without_a_kick(scenario, asking):
     """What it remembered from before the bridge would look like a sudden push."""
     changes = ("safety.infeasible_ticks_max=50", "task.hold_start_s=0.2", "disturbances=[{type: payload}]")
     setup = prepare(scenario(*changes, controller="rcm_inverse_dynamics"))
-    traces = [
-        Simulation(replace(setup, controller=Failing(setup.controller, ticks))).run()
-        for ticks in (set(), set(range(150, 160)))
-    ]
+    traces = [Simulation(asking(setup, _failing_at(ticks))).run() for ticks in (set(), set(range(150, 160)))]
     calm, bridged = (np.abs(np.diff(trace.block("tau"), axis=0)).max(axis=1) for trace in traces)
     assert bridged[160:].max() < 3.0 * calm[150:].max()
     assert traces[1].meta.ending.outcome is Outcome.COMPLETED
 
 
-def test_one_more_ends_the_run_as_infeasible(scenario):
-    trace = _failing(scenario, {100, 101, 102, 103}, "safety.infeasible_ticks_max=3")
+def test_one_more_ends_the_run_as_infeasible(scenario, asking):
+    trace = _failing(scenario, asking, {100, 101, 102, 103}, "safety.infeasible_ticks_max=3")
     ending = trace.meta.ending
     assert (ending.outcome, ending.t_s) == (Outcome.INFEASIBLE, pytest.approx(0.103))
     assert compute_metrics(trace)["infeasible_ticks"] == 4
 
 
-def test_the_last_command_is_never_repeated(scenario):
-    trace = _failing(scenario, set(range(100, 400)), "safety.infeasible_ticks_max=0")
+def test_the_last_command_is_never_repeated(scenario, asking):
+    trace = _failing(scenario, asking, set(range(100, 400)), "safety.infeasible_ticks_max=0")
     assert trace.meta.ending.t_s == pytest.approx(0.1)
     assert np.abs(trace.stop().block("v")[-1]).max() < 1e-3

@@ -78,7 +78,8 @@ def hierarchical_impedance(gains: Array, seen: Seen, memory: Array, out: Array) 
     n, r = seen.q.size, seen.rows
     J, L = np.empty((3 + r, n)), seen.M.copy()
     J[:3] = seen.Jv_WT
-    J[3:] = seen.J_rcm
+    for i in range(r):
+        J[3 + i] = seen.J_rcm[i]
     JMinv = J.copy()
     if not factor(L):
         return RANK_LOST
@@ -91,7 +92,7 @@ def hierarchical_impedance(gains: Array, seen: Seen, memory: Array, out: Array) 
     for i in range(r):
         e_dot = dot(seen.J_rcm[i], seen.v) - seen.rcm_velocity[i]
         force[i] = -gains[6] * seen.rcm_error[i] - gains[7] * e_dot
-    transposed_times(seen.J_rcm, force[:r], out[1])
+    transposed_times(J[3:], force[:r], out[1])
     for j in range(n):
         spring = gains[8 + j] * (seen.q_ref[j] - seen.q[j])
         out[2, j] = spring + gains[8 + n + j] * (seen.qdot_ref[j] - seen.v[j])

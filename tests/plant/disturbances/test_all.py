@@ -138,14 +138,10 @@ def test_those_that_draw_nothing_may_stand_in_any_order(scenario):
 
 
 @pytest.mark.parametrize("name", ["sensor_noise", "sensor_delay"])
-def test_controllers_and_environments_see_what_is_measured(scenario, name):
+def test_controllers_and_environments_see_what_is_measured(scenario, asking, name):
     short = scenario(*SHORT, _list(name), controller="joint_impedance")
-    simulation = Simulation(prepare(short))
     seen = []
-    controller = simulation._setup.controller
-    tick = controller.tick
-    controller.tick = lambda state, command: (seen.append(state.q.copy()), tick(state, command))[1]
-    trace = simulation.run()
+    trace = Simulation(asking(prepare(short), lambda tick, problem: seen.append(problem.q))).run()
     assert (np.array(seen)[50:] != trace.block("q")[50 : len(seen)]).any(axis=1).all()
 
     environment = load(short, action="torque")

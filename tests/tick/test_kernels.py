@@ -1,0 +1,97 @@
+"""A kernel is its own reference: the same bits as Python, compiled, in the loop, in threads."""
+
+import os
+import subprocess
+import sys
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from surgsim.control.port_estimators import PORT_ESTIMATORS
+from surgsim.control.resolvers import RESOLVERS
+from surgsim.control.torque_laws import TORQUE_LAWS
+from surgsim.simulate.loop import Simulation, simulate
+from surgsim.simulate.setup import prepare
+
+ANSWERS = """
+import sys
+import numpy as np
+from surgsim.contract import problems
+from surgsim.control.port_estimators import PORT_ESTIMATORS
+from surgsim.control.resolvers import RESOLVERS
+from surgsim.control.torque_laws import TORQUE_LAWS
+
+arm = problems.arm()
+for catalog, make, call in (
+    (RESOLVERS, problems.velocity_problem, "step"),
+    (TORQUE_LAWS, problems.torque_problem, "torque"),
+):
+    for name in catalog.names():
+        part = catalog.config(name)().build(arm)
+        if not hasattr(part, "kernel"):
+            continue
+        memory = None
+        for seed in range(3):
+            found, memory = getattr(part, call)(make(seed), memory)
+            values = found if call == "torque" else found.qdot
+            print(name, seed, values.tobytes().hex(), memory.tobytes().hex())
+"""
+
+
+def _answers(*, compiled):
+    environment = {**os.environ, "NUMBA_DISABLE_JIT": "0" if compiled else "1"}
+    found = subprocess.run(
+        [sys.executable, "-c", ANSWERS], env=environment, capture_output=True, text=True, timeout=300
+    )
+    assert found.returncode == 0, found.stderr
+    return found.stdout.splitlines()
+
+
+def test_the_python_form_of_a_law_gives_the_bits_of_the_compiled_one():
+    python, compiled = _answers(compiled=False), _answers(compiled=True)
+    names = {line.split()[0] for line in python}
+    assert {"pinv", "gradient", "rnn", "vprnn", "joint_impedance", "rcm_inverse_dynamics"} <= names
+    assert python == compiled
+
+
+@pytest.mark.parametrize("controller", ["pinv", "vprnn", "joint_impedance", "rcm_inverse_dynamics"])
+def test_a_function_without_its_decorator_runs_in_the_loop_with_the_same_trace(scenario, controller):
+    made = scenario("task.duration_s=0.2", controller=controller)
+    expected = simulate(made)
+    setup = prepare(made)
+    parts = setup.controller.parts
+    plain = type(parts)(**{name: _undecorated(getattr(parts, name)) for name in ("port", "resolver", "law")})
+    trace = Simulation(replace(setup, controller=setup.controller.with_parts(plain))).run()
+    assert trace.equals(expected)
+
+
+def _undecorated(part):
+    """The part with its kernel as plain Python."""
+    return replace(part, kernel=part.kernel.py_func)
+
+
+def test_threads_do_not_disturb_each_other(scenario):
+    made = [scenario(f"task.radius_m={0.002 + 0.0005 * i}", controller="vprnn") for i in range(4)]
+    alone = [simulate(one) for one in made]
+    with ThreadPoolExecutor(4) as pool:
+        together = list(pool.map(simulate, made))
+    for a, b in zip(alone, together, strict=True):
+        assert a.equals(b)
+
+
+def test_every_shipped_law_but_the_python_ones_is_a_kernel(arm):
+    python = {"mink", "policy", "qp", "passive_qp", "self_motion"}
+    for catalog in (RESOLVERS, TORQUE_LAWS, PORT_ESTIMATORS):
+        for name in set(catalog.names()) - python:
+            assert hasattr(catalog.config(name)().build(arm), "kernel"), name
+
+
+def test_a_tick_at_a_time_gives_the_same_run(scenario):
+    made = scenario("task.duration_s=0.2")
+    stepped = Simulation(prepare(made))
+    while not stepped.ended:
+        stepped.tick()
+    assert stepped.trace().equals(simulate(made))
+    assert np.isfinite(stepped.trace()["t_s"]).all()
