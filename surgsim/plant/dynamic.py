@@ -26,6 +26,7 @@ from surgsim.plant.world import (
     ACTUATE,
     AFTER_STEP,
     BEFORE_STEP,
+    BLOCK_TICKS,
     GRIP,
     KINDS,
     PORT_MOTION,
@@ -47,6 +48,8 @@ from surgsim.tick.status import GOES_ON
 from surgsim.tick.views import doubles, site_place, vector
 
 Array = NDArray[np.float64]
+_FIRST_PART = 2
+"""Own columns and the ledger stand before the parts."""
 
 
 class DynamicPlantConfig(PartConfig):
@@ -221,6 +224,9 @@ class DynamicPlant:
         self._begin, self.advance = as_parameter(begin, signature), as_parameter(advance_dynamics, signature)
         self._look = as_parameter(look, signature)
         self._ledger = EnergyLedger(scene, self._data, self._port) if energy_ledger else None
+        for part in self._parts:
+            part.attach(scene, control_period_s)
+        self._drawn_at = -1
         self._joint_columns, places = joint_columns(scene.model)
         self._table = self._hooks(places)
         self._points = PointReader(scene, self._data)
@@ -263,7 +269,7 @@ class DynamicPlant:
                 Hook(kind=AFTER_STEP, part=1, rank=0, function=self._ledger.after_step),
                 Hook(kind=VALUES, part=1, rank=0, function=lambda: self._record(1, self._ledger_terms())),
             ]
-        for number, part in enumerate(self._parts, 2):
+        for number, part in enumerate(self._parts, _FIRST_PART):
             width = sum(len(block.columns) for block in part.columns) if _records(part) else 0
             arrays.append((part.gains, part.memory, width))
             hooks += self._hooks_of(part, number)
@@ -300,6 +306,8 @@ class DynamicPlant:
         world.tick, world.t_s = 0, 0.0
         world.f_T[:] = 0.0
         self._start_parts()
+        self._drawn_at = -1
+        self.refill()
         self._port.reset()
         if self._ledger is not None:
             self._ledger.start()
@@ -340,6 +348,11 @@ class DynamicPlant:
 
     def refill(self) -> None:
         """Let the parts draw what they need for the coming ticks; to be called every `BLOCK_TICKS`."""
+        tick = int(self.world.tick)
+        if tick % BLOCK_TICKS == 0 and tick != self._drawn_at:
+            self._drawn_at = tick
+            for number, part in enumerate(self._parts, _FIRST_PART):
+                part.refill(self._table.memory_of(number))
 
     def state(self) -> State:
         """A copy of what is measured now."""

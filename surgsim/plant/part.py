@@ -39,9 +39,10 @@ class PlantPart:
         touches_tip: Whether it can press on the instrument's tip, so that the force there is measured.
         rank: Where it stands in the chains of `actuate` and `sense`: lower first, then as in the scenario.
         kernels: Compiled hooks by name, which stand for the methods of that name:
-            status = hook(gains, world, memory, out), with the time in `world.time` and `out` for `values`.
-        gains: Their numbers, taken over after `start`.
-        memory: Their memory at the beginning of a run, taken over after `start`.
+            status = hook(gains, world, memory, out), with the time of a physics step in `world.step_s` and
+            `out` for `values`.
+        gains: Their numbers, of a size that is fixed by `attach`; taken over after `start`.
+        memory: Their memory at the beginning of a run, likewise.
     """
 
     columns: tuple[Block, ...] = ()
@@ -54,8 +55,17 @@ class PlantPart:
     def modify(self, spec: mujoco.MjSpec) -> None:
         """Change the model before it is compiled."""
 
+    def attach(self, scene: Scene, dt_s: float) -> None:
+        """The scene is compiled, the control period is `dt_s` [s]: settle the sizes of gains and memory."""
+
     def start(self, scene: Scene, data: mujoco.MjData, rng: np.random.Generator, dt_s: float) -> None:
         """Forget the last run. `rng` is the part's own, `dt_s` the control period [s]."""
+
+    def refill(self, memory: Array) -> None:
+        """Draw into the kernels' `memory` what the next `BLOCK_TICKS` ticks need.
+
+        Called after `start`, and whenever so many ticks have passed, before the next one.
+        """
 
     def actuate(self, torque: Array) -> Array:
         """Torque (7,) [N m] that reaches the joints in this period, given the one commanded; once a tick."""

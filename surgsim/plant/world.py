@@ -132,7 +132,7 @@ class HookTable:
             raise SurgsimError(f"disturbances and props have {len(hooks)} hooks; at most {SLOTS} are allowed")
         ends = np.cumsum([[0, 0, 0]] + [[len(g), len(m), w] for g, m, w in parts], axis=0)
         count = len(hooks)
-        self._widths = ends[:, 2]
+        self._ends = ends
         order, counts = np.zeros((len(KINDS), SLOTS), dtype=np.int64), np.zeros(len(KINDS), dtype=np.int64)
         places = np.zeros((SLOTS, 6), dtype=np.int64)
         entered = [PythonPart(h.function) for h in hooks if not isinstance(h.function, Dispatcher)]
@@ -176,7 +176,11 @@ class HookTable:
 
     def values_of(self, part: int) -> Array:
         """The columns of a part, a view of the plant's values."""
-        return self.arrays.values[self._widths[part] : self._widths[part + 1]]
+        return self.arrays.values[self._ends[part, 2] : self._ends[part + 1, 2]]
+
+    def memory_of(self, part: int) -> Array:
+        """The memory of a part, a view of that of all."""
+        return self.arrays.memory[self._ends[part, 1] : self._ends[part + 1, 1]]
 
     def raised(self) -> BaseException | None:
         """What a hook in Python raised."""

@@ -9,6 +9,7 @@ from numba.core import cgutils
 from numba.extending import intrinsic, overload
 
 from surgsim.compiled import compiled
+from surgsim.tick.algebra import cross
 from surgsim.tick.arrays import Array, World
 
 
@@ -46,6 +47,19 @@ def vector(address: int, size: int) -> Array:
 def applied_wrench(world: World, body: int) -> Array:
     """Applied force and torque on a body (6,) [N, N m], about its centre of mass, world frame."""
     return doubles(world.xfrc_applied, world.nbody, 6)[body]
+
+
+@compiled
+def push_at(world: World, body: int, point: Array, force: Array) -> None:
+    """Add a force (3,) [N] on a body at a point (3,) [m], with its moment about the centre of mass."""
+    wrench, centre = applied_wrench(world, body), centre_of_mass(world, body)
+    arm, moment = np.empty(3), np.empty(3)
+    for i in range(3):
+        arm[i] = point[i] - centre[i]
+    cross(arm, force, moment)
+    for i in range(3):
+        wrench[i] += force[i]
+        wrench[3 + i] += moment[i]
 
 
 @compiled

@@ -1,17 +1,55 @@
 """Torques that act later than commanded."""
 
-from collections import deque
-from typing import Annotated, Literal
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
+from surgsim.compiled import compiled
 from surgsim.models.build import Scene
 from surgsim.plant.disturbances.base import DELAYED, Disturbance, DisturbanceConfig, whole_ticks
+from surgsim.plant.world import BLOCK_TICKS
+from surgsim.tick.arrays import World
+from surgsim.tick.status import GOES_ON
 
 Array = NDArray[np.float64]
+
+
+DELAY, ROOM = 0, 1
+"""Gains: d in ticks, and how many commands can be on the line."""
+OLDEST, ACTING = 0, 1
+"""Memory: the oldest command on the line, the torque that acts (n,); then jitter, arrivals and torques."""
+
+
+@compiled
+def carry(gains: Array, world: World, memory: Array, out: Array) -> int:
+    """The newest torque that has arrived acts.
+
+    Command k arrives at tick a_k = max(k + d + j_k, a_{k-1}) with the delay d and the jitter j_k in ticks.
+    Of those that arrive in one tick the newest acts; it holds until another arrives. Before the first arrives
+    it acts already: the arm was being held before.
+    """
+    n, k, room = world.torque.size, world.tick, int(gains[ROOM])
+    begin = ACTING + n + BLOCK_TICKS
+    acting, jitter = memory[ACTING : ACTING + n], memory[ACTING + n : begin]
+    arrivals, torques = memory[begin : begin + room], memory[begin + room :]
+    at = k % room
+    arrivals[at] = max(k + gains[DELAY] + jitter[k % BLOCK_TICKS], arrivals[(k - 1) % room])
+    for i in range(n):
+        torques[at * n + i] = world.torque[i]
+        if k == 0:
+            acting[i] = world.torque[i]
+    while memory[OLDEST] <= k and arrivals[int(memory[OLDEST]) % room] <= k:
+        at = int(memory[OLDEST]) % room
+        for i in range(n):
+            acting[i] = torques[at * n + i]
+        memory[OLDEST] += 1.0
+    for i in range(n):
+        world.torque[i] = acting[i]
+    return GOES_ON
 
 
 class ActuationDelayConfig(DisturbanceConfig):
@@ -38,40 +76,34 @@ class ActuationDelayConfig(DisturbanceConfig):
 
 
 class ActuationDelay(Disturbance):
-    """A line on which every command travels for its own time, and none overtakes another.
-
-    Command k arrives at tick a_k = max(k + d + j_k, a_{k-1}) with the delay d and the jitter j_k in ticks.
-    Of those that arrive in one tick the newest acts; it holds until another arrives. Before the first arrives
-    it acts already: the arm was being held before.
-    """
+    """A line on which every command travels for its own time, and none overtakes another."""
 
     rank = DELAYED
+    kernels: Mapping[str, Any] = {"actuate": carry}
 
     def __init__(self, config: ActuationDelayConfig) -> None:
         self._c = config
-        self._line: deque[tuple[int, Array]] = deque()
         self._rng = np.random.default_rng(0)
-        self._ticks = self._jitter = self._now = 0
-        self._acting: Array | None = None
+        self._jitter, self._first = 0, 0
+
+    def attach(self, scene: Scene, dt_s: float) -> None:
+        """Make room for the commands."""
+        n, ticks, self._jitter = (
+            len(scene.dof_ids),
+            round(self._c.delay_s / dt_s),
+            round(self._c.jitter_s / dt_s),
+        )
+        room = ticks + self._jitter + 2
+        self._first = ACTING + n
+        self.gains = np.array([float(ticks), float(room)])
+        self.memory = np.zeros(self._first + BLOCK_TICKS + room * (1 + n))
 
     def start(self, scene: Scene, data: mujoco.MjData, rng: np.random.Generator, dt_s: float) -> None:
-        """Forget all commands."""
-        self._ticks = round(self._c.delay_s / dt_s)
-        self._jitter = round(self._c.jitter_s / dt_s)
+        """Draw from the beginning."""
         self._rng = rng
-        self._line.clear()
-        self._now, self._acting = 0, None
 
-    def actuate(self, torque: Array) -> Array:
-        """The newest torque that has arrived."""
-        if self._acting is None:
-            self._acting = torque
-        late = int(self._rng.integers(self._jitter + 1)) if self._jitter else 0
-        arrival = self._now + self._ticks + late
-        if self._line:
-            arrival = max(arrival, self._line[-1][0])
-        self._line.append((arrival, torque))
-        while self._line and self._line[0][0] <= self._now:
-            self._acting = self._line.popleft()[1]
-        self._now += 1
-        return self._acting
+    def refill(self, memory: Array) -> None:
+        """Draw the jitter of the coming ticks."""
+        if self._jitter:
+            drawn = self._rng.integers(self._jitter + 1, size=BLOCK_TICKS)
+            memory[self._first : self._first + BLOCK_TICKS] = drawn

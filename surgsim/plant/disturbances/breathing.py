@@ -7,14 +7,83 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, PositiveFloat, model_validator
 
+from surgsim.compiled import compiled
 from surgsim.errors import SurgsimError
 from surgsim.models.config import Vec3
 from surgsim.plant.disturbances.base import Disturbance, DisturbanceConfig, Spread, spread_factor
-from surgsim.plant.part import PortMotion
-from surgsim.plant.state import State
 from surgsim.spatial import unit
+from surgsim.tick.arrays import World
+from surgsim.tick.status import GOES_ON
 
 Array = NDArray[np.float64]
+
+
+EXCURSION, PHASE, RATE, INSPIRATION, RAMP = 0, 3, 4, 5, 6
+"""Gains: excursion A d (3,) [m], phase at the start, breaths [Hz], share of inspiration, ramp [s]."""
+
+
+@compiled
+def breath(gains: Array, t_s: float) -> tuple[float, float]:
+    """Share r w of the excursion at `t_s` [s], and its rate [1/s].
+
+    With the smooth step
+
+        s(x) = 10 x^3 - 15 x^4 + 6 x^5,   0 <= x <= 1
+
+    the ramp is r = s(t / ramp), and both flanks of the wave are w = s(x / i) while x < i, then
+    w = s((1 - x) / (1 - i)), with the phase x of the breath and the share i of inspiration. Position,
+    velocity and acceleration are continuous, and the motion begins at rest.
+    """
+    rate, inspiration = gains[RATE], gains[INSPIRATION]
+    x = (gains[PHASE] + t_s * rate) % 1.0
+    if x < inspiration:
+        w, dw = _step(x / inspiration)
+        dw *= rate / inspiration
+    else:
+        w, dw = _step((1.0 - x) / (1.0 - inspiration))
+        dw *= -rate / (1.0 - inspiration)
+    if t_s >= gains[RAMP]:
+        return w, dw
+    r, dr = _step(t_s / gains[RAMP])
+    return r * w, dr / gains[RAMP] * w + r * dw
+
+
+@compiled
+def _step(x: float) -> tuple[float, float]:
+    """Smooth step of `x` from 0 to 1, and its slope."""
+    rest = x * (1.0 - x)
+    return x * x * x * (10.0 - x * (15.0 - 6.0 * x)), 30.0 * (rest * rest)
+
+
+@compiled
+def move_port(gains: Array, world: World, memory: Array, out: Array) -> int:
+    """The port moves: offset r w A d, and its velocity."""
+    level, rate = breath(gains, world.step_s)
+    for i in range(3):
+        world.port_offset[i] += level * gains[EXCURSION + i]
+        world.port_velocity[i] += rate * gains[EXCURSION + i]
+    return GOES_ON
+
+
+@compiled
+def announce(gains: Array, world: World, memory: Array, out: Array) -> int:
+    """The controller is told the velocity."""
+    _, rate = breath(gains, world.t_s)
+    for i in range(3):
+        world.v_WC_m[i] += rate * gains[EXCURSION + i]
+    return GOES_ON
+
+
+@compiled
+def hide(gains: Array, world: World, memory: Array, out: Array) -> int:
+    """The controller is told the position without this motion."""
+    level, _ = breath(gains, world.t_s)
+    for i in range(3):
+        world.p_WC_m[i] -= level * gains[EXCURSION + i]
+    return GOES_ON
+
+
+_TOLD = {"tracked": {}, "announced": {"sense": announce}, "hidden": {"sense": hide}}
 
 
 class BreathingConfig(DisturbanceConfig):
@@ -72,63 +141,17 @@ def refuse_without_port(spec: mujoco.MjSpec, name: str) -> None:
 
 
 class Breathing(Disturbance):
-    """Moves the port along a line, with a smooth rise and a smooth fall a breath.
+    """Moves the port along a line, with a smooth rise and a smooth fall a breath: `breath`.
 
-    Offset r(t) w(t) A d with the excursion A, the direction d and the smooth step
-
-        s(x) = 10 x^3 - 15 x^4 + 6 x^5,   0 <= x <= 1
-
-    as ramp r = s(t / ramp) and as both flanks of the wave: w = s(x / i) while x < i, then
-    w = s((1 - x) / (1 - i)), with the phase x of the breath and the share i of inspiration. Position,
-    velocity and acceleration are continuous, and the motion begins at rest. It is a function of time:
-    there is nothing to reset.
-
-    Several breaths add up, and each says or hides its own part: the position known is the true one less the
-    offsets of the hidden, the velocity known the sum of the announced.
+    It is a function of time: there is nothing to reset. Several breaths add up, and each says or hides its
+    own part: the position known is the true one less the offsets of the hidden, the velocity known the sum of
+    the announced.
     """
 
     def __init__(self, config: BreathingConfig, excursion: Array, phase: float) -> None:
-        self._c = config
-        self._excursion = excursion
-        self._phase = phase
+        self.kernels = {"port_motion": move_port, **_TOLD[config.seen]}
+        self.gains = np.array([*excursion, phase, config.rate_hz, config.inspiration_share, config.ramp_s])
 
     def modify(self, spec: mujoco.MjSpec) -> None:
         """Refuse a scenario without a trocar."""
         refuse_without_port(spec, "breathing")
-
-    def port_motion(self, t_s: float) -> PortMotion:
-        """Offset of the port and its velocity at `t_s` [s]."""
-        level, rate = self.level(t_s)
-        return PortMotion(offset=level * self._excursion, velocity=rate * self._excursion)
-
-    def level(self, t_s: float) -> tuple[float, float]:
-        """Share of the excursion at `t_s` [s], and its rate [1/s]."""
-        c = self._c
-        x = (self._phase + t_s * c.rate_hz) % 1.0
-        if x < c.inspiration_share:
-            w, dw = _step(x / c.inspiration_share)
-            dw *= c.rate_hz / c.inspiration_share
-        else:
-            w, dw = _step((1.0 - x) / (1.0 - c.inspiration_share))
-            dw *= -c.rate_hz / (1.0 - c.inspiration_share)
-        if t_s >= c.ramp_s:
-            return w, dw
-        r, dr = _step(t_s / c.ramp_s)
-        return r * w, dr / c.ramp_s * w + r * dw
-
-    def sense(self, state: State) -> State:
-        """What the controller is told of the port."""
-        if self._c.seen == "tracked":
-            return state
-        p_WC, v_WC = state.p_WC, state.v_WC
-        level, rate = self.level(state.t_s)
-        if self._c.seen == "announced":
-            v_WC = v_WC + rate * self._excursion
-        else:
-            p_WC = p_WC - level * self._excursion
-        return State(t_s=state.t_s, q=state.q, v=state.v, tau=state.tau, p_WC=p_WC, v_WC=v_WC, f_T=state.f_T)
-
-
-def _step(x: float) -> tuple[float, float]:
-    """Smooth step of `x` from 0 to 1, and its slope."""
-    return x * x * x * (10.0 - x * (15.0 - 6.0 * x)), 30.0 * (x * (1.0 - x)) ** 2

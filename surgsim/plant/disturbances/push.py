@@ -1,19 +1,51 @@
 """A push on the instrument or the arm."""
 
 import math
-from typing import Annotated, Literal
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal
 
-import mujoco
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, NonNegativeFloat, PositiveFloat
 
+from surgsim.compiled import compiled
 from surgsim.models.build import Scene
 from surgsim.models.config import Vec3
 from surgsim.plant.disturbances.base import Direction, Disturbance, DisturbanceConfig, pointed
-from surgsim.spatial import cross
+from surgsim.tick.arrays import World
+from surgsim.tick.status import GOES_ON
+from surgsim.tick.views import body_place, push_at, site_place, site_turn
 
 Array = NDArray[np.float64]
+
+
+FORCE, START, LENGTH, RISE, BODY, SITE, DISTANCE = 0, 3, 4, 5, 6, 7, 8
+"""Gains: force (3,) [N], its times [s], the body pushed, the site on whose axis or -1, from it back [m]."""
+
+
+@compiled
+def push_level(gains: Array, t_s: float) -> float:
+    """Share of the force that acts at `t_s` [s]: raised cosine edges."""
+    t = t_s - gains[START]
+    edge = min(t, gains[LENGTH] - t) / gains[RISE]
+    return 0.5 - 0.5 * math.cos(math.pi * min(edge, 1.0)) if edge > 0.0 else 0.0
+
+
+@compiled
+def push(gains: Array, world: World, memory: Array, out: Array) -> int:
+    """Add the force to that on the body that carries the point, with its moment."""
+    level = push_level(gains, world.step_s)
+    if level == 0.0:
+        return GOES_ON
+    body, site, force, point = int(gains[BODY]), int(gains[SITE]), np.empty(3), np.empty(3)
+    for i in range(3):
+        force[i] = level * gains[FORCE + i]
+        if site < 0:
+            point[i] = body_place(world, body)[i]
+        else:
+            point[i] = site_place(world, site)[i] - gains[DISTANCE] * site_turn(world, site)[3 * i + 2]
+    push_at(world, body, point, force)
+    return GOES_ON
 
 
 class PushConfig(DisturbanceConfig):
@@ -50,35 +82,22 @@ class PushConfig(DisturbanceConfig):
 
 
 class Push(Disturbance):
-    """Adds the force to `xfrc_applied` of the body that carries the point, with its moment."""
+    """Pushes on the instrument or a link."""
+
+    kernels: Mapping[str, Any] = {"push": push}
 
     def __init__(self, config: PushConfig, force: Array) -> None:
         self._c = config
-        self._force = force
+        self.gains = np.array([*force, config.start_s, config.duration_s, config.rise_s, 0.0, -1.0, 0.0])
 
-    def push(self, t_s: float, scene: Scene, data: mujoco.MjData) -> None:
-        """Add the force at `t_s` [s]."""
-        level = self.level(t_s)
-        if level == 0.0:
+    def attach(self, scene: Scene, dt_s: float) -> None:
+        """Find the body that is pushed."""
+        gains, tip, at = self.gains, scene.tip_site, self._c.at
+        if at in _LINKS:
+            gains[BODY] = int(scene.model.body(_LINKS[at]).id)
             return
-        body, point = self._place(scene, data)
-        force = level * self._force
-        data.xfrc_applied[body, :3] += force
-        data.xfrc_applied[body, 3:] += cross(point - data.xipos[body], force)
+        gains[BODY], gains[SITE] = int(scene.model.site_bodyid[tip]), tip
+        gains[DISTANCE] = self._c.distance_m if at == "shaft" else 0.0
 
-    def level(self, t_s: float) -> float:
-        """Share of the force that acts at `t_s` [s]: raised cosine edges."""
-        t = t_s - self._c.start_s
-        edge = min(t, self._c.duration_s - t) / self._c.rise_s
-        return 0.5 - 0.5 * math.cos(math.pi * min(edge, 1.0)) if edge > 0.0 else 0.0
 
-    def _place(self, scene: Scene, data: mujoco.MjData) -> tuple[int, Array]:
-        """The body that is pushed, and the point (3,) [m]."""
-        tip = scene.tip_site
-        if self._c.at == "tip":
-            return int(scene.model.site_bodyid[tip]), data.site_xpos[tip]
-        if self._c.at == "shaft":
-            point = data.site_xpos[tip] - self._c.distance_m * data.site_xmat[tip, 2::3]
-            return int(scene.model.site_bodyid[tip]), point
-        body = int(scene.model.body({"elbow": "link4", "wrist": "link6"}[self._c.at]).id)
-        return body, data.xpos[body]
+_LINKS = {"elbow": "link4", "wrist": "link6"}

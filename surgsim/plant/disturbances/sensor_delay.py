@@ -1,16 +1,63 @@
 """Measurements that are old when the controller sees them."""
 
-from collections import deque
-from dataclasses import replace
-from typing import Annotated, Literal
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal
 
-import mujoco
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field
 
+from surgsim.compiled import compiled
 from surgsim.models.build import Scene
 from surgsim.plant.disturbances.base import LATE, Disturbance, DisturbanceConfig, whole_ticks
-from surgsim.plant.state import State
+from surgsim.tick.arrays import World
+from surgsim.tick.status import GOES_ON
+
+Array = NDArray[np.float64]
+
+
+@compiled
+def _write(world: World, row: Array) -> None:
+    """What is measured now, to a row (3 n + 9,)."""
+    n = world.q_m.size
+    for i in range(n):
+        row[i], row[n + i], row[2 * n + i] = world.q_m[i], world.v_m[i], world.tau_m[i]
+    for i in range(3):
+        row[3 * n + i], row[3 * n + 3 + i], row[3 * n + 6 + i] = (
+            world.p_WC_m[i],
+            world.v_WC_m[i],
+            world.f_T_m[i],
+        )
+
+
+@compiled
+def _read(world: World, row: Array) -> None:
+    """What was measured, from a row (3 n + 9,)."""
+    n = world.q_m.size
+    for i in range(n):
+        world.q_m[i], world.v_m[i], world.tau_m[i] = row[i], row[n + i], row[2 * n + i]
+    for i in range(3):
+        world.p_WC_m[i] = row[3 * n + i]
+        world.v_WC_m[i] = row[3 * n + 3 + i]
+        world.f_T_m[i] = row[3 * n + 6 + i]
+
+
+@compiled
+def delay(gains: Array, world: World, memory: Array, out: Array) -> int:
+    """What was measured d ticks ago, at the present time; the memory is the last d + 1 states in a ring.
+
+    All of them are the first one at the start: the arm was at rest before.
+    """
+    width = 3 * world.q_m.size + 9
+    count = memory.size // width
+    if world.tick == 0:
+        for k in range(count):
+            _write(world, memory[k * width : (k + 1) * width])
+        return GOES_ON
+    now, then = world.tick % count, (world.tick + 1) % count
+    _write(world, memory[now * width : (now + 1) * width])
+    _read(world, memory[then * width : (then + 1) * width])
+    return GOES_ON
 
 
 class SensorDelayConfig(DisturbanceConfig):
@@ -33,23 +80,15 @@ class SensorDelayConfig(DisturbanceConfig):
 
 
 class SensorDelay(Disturbance):
-    """A queue of states, full of the first one at the start: the arm was at rest before."""
+    """A ring of states, full of the first one at the start."""
 
     rank = LATE
+    kernels: Mapping[str, Any] = {"sense": delay}
 
     def __init__(self, config: SensorDelayConfig) -> None:
         self._c = config
-        self._queue: deque[State] = deque()
-        self._ticks = 0
 
-    def start(self, scene: Scene, data: mujoco.MjData, rng: np.random.Generator, dt_s: float) -> None:
-        """Forget all states."""
-        self._ticks = round(self._c.delay_s / dt_s)
-        self._queue.clear()
-
-    def sense(self, state: State) -> State:
-        """The state of `delay_s` ago, at the present time."""
-        if not self._queue:
-            self._queue.extend([state] * self._ticks)
-        self._queue.append(state)
-        return replace(self._queue.popleft(), t_s=state.t_s)
+    def attach(self, scene: Scene, dt_s: float) -> None:
+        """Make room for the states."""
+        ticks = round(self._c.delay_s / dt_s)
+        self.memory = np.zeros((ticks + 1) * (3 * len(scene.dof_ids) + 9))

@@ -1,20 +1,77 @@
 """Sensors that are noisy, and joint positions in whole counts of the encoder."""
 
 import math
-from typing import Annotated, Literal
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, NonNegativeFloat, PositiveFloat
 
+from surgsim.compiled import compiled
 from surgsim.models.build import Scene
 from surgsim.plant.disturbances.base import SENSOR, Disturbance, DisturbanceConfig
-from surgsim.plant.state import State
+from surgsim.plant.world import BLOCK_TICKS
+from surgsim.tick.arrays import World
+from surgsim.tick.status import GOES_ON
 
 Array = NDArray[np.float64]
-_BLOCK = 256
-_Q, _V, _TAU, _PORT, _TIP = slice(0, 7), slice(7, 14), slice(14, 21), slice(21, 24), slice(24, 27)
+Q_STD, V_STD, TAU_STD, PORT_STD, TIP_STD, RESOLUTION, KEEP, RATE = range(8)
+"""Gains: s_q, s_v, s_t, s_p, s_f; r (0: no steps); a (-1: no differences); tracker (0: always) [Hz]."""
+FRAME, PORT, NOISE = 0, 1, 4
+"""Memory: the tracker's measurements so far, the last (3,) [m], the noise's rows; then q_m and v_m."""
+
+
+@compiled
+def measure(gains: Array, world: World, memory: Array, out: Array) -> int:
+    """What the sensors say: noise, encoder steps, differences and the tracker's hold.
+
+    Measured from true, at tick k with independent normal n:
+
+        q_m = r round((q + s_q n) / r),   r = 2 pi / 2^bits        (no rounding without bits)
+        v_m = v + s_v n,   or   v_m = a v_m,k-1 + (1 - a) (q_m - q_m,k-1) / h,   a = exp(-2 pi f h)
+        tau_m = tau + s_t n,   p_m = p_WC + s_p n,   f_m = f_T + s_f n
+
+    with the control period h and the cut-off f. The arm is at rest before the first tick.
+    """
+    n = world.q_m.size
+    width = 3 * n + 6
+    row = 0 if world.tick == 0 else (world.tick - 1) % BLOCK_TICKS + 1
+    noise = memory[NOISE + row * width : NOISE + (row + 1) * width]
+    last = memory[NOISE + (BLOCK_TICKS + 1) * width :]
+    step, keep = gains[RESOLUTION], gains[KEEP]
+    for i in range(n):
+        q = world.q_m[i] + gains[Q_STD] * noise[i]
+        if step > 0.0:
+            q = step * np.rint(q / step)
+        if keep < 0.0:
+            world.v_m[i] += gains[V_STD] * noise[n + i]
+        else:
+            if world.tick == 0:
+                last[n + i] = 0.0
+            else:
+                last[n + i] = keep * last[n + i] + (1.0 - keep) / world.dt_s * (q - last[i])
+            world.v_m[i] = last[n + i]
+        last[i] = world.q_m[i] = q
+        world.tau_m[i] += gains[TAU_STD] * noise[2 * n + i]
+    for i in range(3):
+        world.p_WC_m[i] += gains[PORT_STD] * noise[3 * n + i]
+        world.f_T_m[i] += gains[TIP_STD] * noise[3 * n + 3 + i]
+    if gains[RATE] > 0.0:
+        _track(gains, world, memory)
+    return GOES_ON
+
+
+@compiled
+def _track(gains: Array, world: World, memory: Array) -> None:
+    """The port's position, measured at the tracker's rate."""
+    frame = math.floor(world.t_s * gains[RATE] + 1e-6) + 1
+    for i in range(3):
+        if frame != memory[FRAME]:
+            memory[PORT + i] = world.p_WC_m[i]
+        world.p_WC_m[i] = memory[PORT + i]
+    memory[FRAME] = frame
 
 
 class SensorNoiseConfig(DisturbanceConfig):
@@ -73,80 +130,45 @@ class SensorNoiseConfig(DisturbanceConfig):
 class SensorNoise(Disturbance):
     """Noise, encoder steps, differences and the tracker's hold.
 
-    Measured from true, at tick k with independent normal n:
-
-        q_m = r round((q + s_q n) / r),   r = 2 pi / 2^bits        (no rounding without bits)
-        v_m = v + s_v n,   or   v_m = a v_m,k-1 + (1 - a) (q_m - q_m,k-1) / h,   a = exp(-2 pi f h)
-        tau_m = tau + s_t n,   p_m = p_WC + s_p n,   f_m = f_T + s_f n
-
-    with the control period h and the cut-off f. The arm is at rest before the first tick.
-
     Source: of the joint sensor, DLR's description of its light-weight robot; of the cut-off, libfranka's
     `kDefaultCutoffFrequency`.
     """
 
     rank = SENSOR
+    kernels: Mapping[str, Any] = {"sense": measure}
 
     def __init__(self, config: SensorNoiseConfig) -> None:
-        self._c = c = config
-        v_std = c.velocity_std_rad_per_s
-        sizes = [c.position_std_rad, v_std, c.torque_std_nm, c.port_std_m, c.tip_force_std_n]
-        self._std = np.repeat(sizes, [7, 7, 7, 3, 3])
-        self._resolution = None if c.position_bits is None else 2.0 * math.pi / 2.0**c.position_bits
+        self._c = config
         self._rng = np.random.default_rng(0)
-        self._noise = np.zeros((0, 27))
-        self._tick, self._dt, self._keep = 0, 1.0, 0.0
-        self._q, self._v, self._p_WC, self._frame = np.zeros(7), np.zeros(7), np.zeros(3), -1
+        self._begins, self._width = True, 0
+
+    def attach(self, scene: Scene, dt_s: float) -> None:
+        """Settle the gains, and make room for the noise."""
+        c, n = self._c, len(scene.dof_ids)
+        self._width = 3 * n + 6
+        self.gains = np.array(
+            [
+                c.position_std_rad,
+                c.velocity_std_rad_per_s,
+                c.torque_std_nm,
+                c.port_std_m,
+                c.tip_force_std_n,
+                0.0 if c.position_bits is None else 2.0 * math.pi / 2.0**c.position_bits,
+                math.exp(-2.0 * math.pi * c.velocity_cutoff_hz * dt_s)
+                if c.velocity == "differentiated"
+                else -1.0,
+                c.port_rate_hz or 0.0,
+            ]
+        )
+        self.memory = np.zeros(NOISE + (BLOCK_TICKS + 1) * self._width + 2 * n)
 
     def start(self, scene: Scene, data: mujoco.MjData, rng: np.random.Generator, dt_s: float) -> None:
-        """Forget the last run's measurements."""
-        self._rng, self._dt = rng, dt_s
-        self._tick, self._frame = 0, -1
-        self._keep = math.exp(-2.0 * math.pi * self._c.velocity_cutoff_hz * dt_s)
+        """Draw from the beginning."""
+        self._rng, self._begins = rng, True
 
-    def sense(self, state: State) -> State:
-        """What the sensors say of `state`."""
-        noise = self._draw()
-        q = state.q + noise[_Q]
-        if self._resolution is not None:
-            q = self._resolution * np.rint(q / self._resolution)
-        differ = self._c.velocity == "differentiated"
-        v = self._differentiate(q) if differ else state.v + noise[_V]
-        measured = State(
-            t_s=state.t_s,
-            q=q,
-            v=v,
-            tau=state.tau + noise[_TAU],
-            p_WC=self._track(state, noise[_PORT]),
-            v_WC=state.v_WC,
-            f_T=state.f_T + noise[_TIP],
-        )
-        self._tick += 1
-        return measured
-
-    def _draw(self) -> Array:
-        """Noise of one tick (27,); drawn in blocks, which is faster."""
-        at = self._tick % _BLOCK
-        if at == 0:
-            self._noise = self._std * self._rng.standard_normal((_BLOCK, 27))
-        row: Array = self._noise[at]
-        return row
-
-    def _differentiate(self, q: Array) -> Array:
-        """Filtered backward difference of the measured positions (7,) [rad/s]."""
-        if self._tick == 0:
-            self._v = np.zeros(7)
-        else:
-            self._v = self._keep * self._v + (1.0 - self._keep) / self._dt * (q - self._q)
-        self._q = q
-        return self._v.copy()
-
-    def _track(self, state: State, noise: Array) -> Array:
-        """The port's position, measured at the tracker's rate (3,) [m]."""
-        rate = self._c.port_rate_hz
-        if rate is None:
-            return state.p_WC + noise
-        frame = math.floor(state.t_s * rate + 1e-6)
-        if frame != self._frame:
-            self._p_WC, self._frame = state.p_WC + noise, frame
-        return self._p_WC.copy()
+    def refill(self, memory: Array) -> None:
+        """Draw the noise of what is measured at the ends of the coming ticks, at first at the start too."""
+        first = 0 if self._begins else 1
+        rows = memory[NOISE : NOISE + (BLOCK_TICKS + 1) * self._width].reshape(-1, self._width)
+        rows[first:] = self._rng.standard_normal((BLOCK_TICKS + 1 - first, self._width))
+        self._begins = False

@@ -1,6 +1,7 @@
 """Soft tissue that the tip presses on and drags through."""
 
-from typing import Annotated, Literal
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal
 
 import mujoco
 import numpy as np
@@ -9,17 +10,61 @@ from pydantic import Field, model_validator
 
 from surgsim.compiled import compiled
 from surgsim.errors import SurgsimError
-from surgsim.models.build import Scene
 from surgsim.models.config import Vec3
 from surgsim.plant.disturbances.base import Disturbance, DisturbanceConfig, Spread, spread_factor
-from surgsim.spatial import cross, unit
+from surgsim.spatial import unit
+from surgsim.tick.algebra import dot
+from surgsim.tick.arrays import World
+from surgsim.tick.mujoco_calls import mj_objectVelocity
+from surgsim.tick.status import GOES_ON
+from surgsim.tick.views import push_at, site_place
 
 Array = NDArray[np.float64]
 FADE_M = 0.0005
 """d_0: damping and drag fade in over this depth, so that the force is continuous at touch."""
 LIGHTEST_TIP_KG = 0.2
 """Least effective mass that the timestep is checked for; the shipped arms' tips have 0.24 kg and more."""
-_SITE = mujoco.mjtObj.mjOBJ_SITE
+_SITE = int(mujoco.mjtObj.mjOBJ_SITE)
+POINT, NORMAL, LAW = slice(0, 3), slice(3, 6), slice(6, 9)
+"""Gains: p_0 (3,) [m], n (3,), k, b, c (3,)."""
+
+
+@compiled
+def tissue_force(tip: Array, velocity: Array, point: Array, normal: Array, law: Array) -> Array:
+    """Force of the tissue on the tip (3,) [N].
+
+    At the depth p = n . (p_0 - p_WT) > 0 with velocity v, normal n and s = min(1, p / d_0):
+
+        f = max(0, k p - b s n . v) n - c s (v - n (n . v))
+
+    Args:
+        tip: p_WT (3,) [m].
+        velocity: v (3,) [m/s].
+        point: A point p_0 of the plane (3,) [m].
+        normal: n (3,).
+        law: k, b, c (3,).
+    """
+    p = dot(normal, point - tip)
+    if p <= 0.0:
+        return np.zeros(3)
+    share = min(1.0, p / FADE_M)
+    rate = dot(normal, velocity)
+    pressure = max(0.0, law[0] * p - law[1] * share * rate)
+    force: Array = pressure * normal - law[2] * share * (velocity - rate * normal)
+    return force
+
+
+@compiled
+def press(gains: Array, world: World, memory: Array, out: Array) -> int:
+    """Add the force of the tissue, at the tip on the jaws."""
+    tip = site_place(world, world.tip)
+    if dot(gains[NORMAL], gains[POINT] - tip) <= 0.0:
+        return GOES_ON
+    moving = np.empty(6)  # angular, then linear
+    mj_objectVelocity(world.model, world.data, _SITE, world.tip, moving.ctypes.data, 0)
+    force = tissue_force(tip, moving[3:], gains[POINT], gains[NORMAL], gains[LAW])
+    push_at(world, world.jaws, tip, force)
+    return GOES_ON
 
 
 class TissueConfig(DisturbanceConfig):
@@ -61,13 +106,9 @@ class TissueConfig(DisturbanceConfig):
 class Tissue(Disturbance):
     """A spring that only pushes, with damping, and drag across it.
 
-    Force on the tip at the depth p = n . (p_0 - p_WT) > 0 with velocity v, normal n and s = min(1, p / d_0):
-
-        f = max(0, k p - b s n . v) n - c s (v - n (n . v))
-
-    The elastic part has the potential k p^2 / 2, the rest takes energy out; the tissue never pulls, and the
-    force is continuous at touch. It acts at the tip on the jaws, whose sensor measures it. The tissue itself
-    does not move, with the breath neither.
+    The elastic part of `tissue_force` has the potential k p^2 / 2, the rest takes energy out; the tissue
+    never pulls, and the force is continuous at touch. It acts at the tip on the jaws, whose sensor measures
+    it. The tissue itself does not move, with the breath neither.
 
     Args:
         point: A point of the plane (3,) [m].
@@ -76,11 +117,10 @@ class Tissue(Disturbance):
     """
 
     touches_tip = True
+    kernels: Mapping[str, Any] = {"push": press}
 
     def __init__(self, point: Array, normal: Array, law: Array) -> None:
-        self._point, self._normal, self._law = point, normal, law
-        self._jaws = -1
-        self._velocity = np.zeros(6)
+        self.gains = np.concatenate((point, normal, law))
 
     def modify(self, spec: mujoco.MjSpec) -> None:
         """Refuse a scene without an instrument, and a timestep that the tissue's law cannot be stepped with.
@@ -91,46 +131,10 @@ class Tissue(Disturbance):
         if all(body.name != "jaws" for body in spec.bodies):
             raise SurgsimError("disturbance 'tissue' needs an instrument, and the scenario has none")
         h = float(spec.option.timestep)
-        k, b = float(self._law[0]), float(self._law[1:].max())
+        k, b = float(self.gains[LAW][0]), float(self.gains[LAW][1:].max())
         if k * h**2 + b * h > LIGHTEST_TIP_KG:
             raise SurgsimError(
                 f"disturbance 'tissue': k h^2 + b h must be at most {LIGHTEST_TIP_KG:g} kg with "
                 f"stiffness k {k:g} N/m, damping or drag b {b:g} N s/m and timestep_s h {h:g}, not "
                 f"{k * h**2 + b * h:.3g} kg"
             )
-
-    def start(self, scene: Scene, data: mujoco.MjData, rng: np.random.Generator, dt_s: float) -> None:
-        """Nothing to forget; finds the jaws."""
-        self._jaws = int(scene.model.body("jaws").id)
-
-    def push(self, t_s: float, scene: Scene, data: mujoco.MjData) -> None:
-        """Add the force of the tissue."""
-        tip = data.site_xpos[scene.tip_site]
-        if self._normal @ (self._point - tip) <= 0.0:
-            return
-        mujoco.mj_objectVelocity(scene.model, data, _SITE, scene.tip_site, self._velocity, 0)
-        force = tissue_force(tip, self._velocity[3:], self._point, self._normal, self._law)
-        applied = data.xfrc_applied[self._jaws]
-        applied[:3] += force
-        applied[3:] += cross(tip - data.xipos[self._jaws], force)
-
-
-@compiled
-def tissue_force(tip: Array, velocity: Array, point: Array, normal: Array, law: Array) -> Array:
-    """Force of the tissue on the tip (3,) [N].
-
-    Args:
-        tip: p_WT (3,) [m].
-        velocity: v (3,) [m/s].
-        point: A point of the plane (3,) [m].
-        normal: n (3,).
-        law: k, b, c (3,).
-    """
-    p = np.dot(normal, point - tip)
-    if p <= 0.0:
-        return np.zeros(3)
-    share = min(1.0, p / FADE_M)
-    rate = np.dot(normal, velocity)
-    pressure = max(0.0, law[0] * p - law[1] * share * rate)
-    force: Array = pressure * normal - law[2] * share * (velocity - rate * normal)
-    return force

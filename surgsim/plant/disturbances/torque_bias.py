@@ -1,15 +1,35 @@
 """Joint torques that are off by a constant."""
 
-from typing import Literal
+from collections.abc import Mapping
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import NonNegativeFloat
 
+from surgsim.compiled import compiled
 from surgsim.plant.disturbances.base import BIASED, Disturbance, DisturbanceConfig, Spread, spread_factor
-from surgsim.plant.state import State
+from surgsim.tick.arrays import World
+from surgsim.tick.status import GOES_ON
 
 Array = NDArray[np.float64]
+
+
+@compiled
+def bias_drive(gains: Array, world: World, memory: Array, out: Array) -> int:
+    """What acts: tau + b_a, with the first n gains b_a."""
+    for i in range(world.torque.size):
+        world.torque[i] += gains[i]
+    return GOES_ON
+
+
+@compiled
+def bias_sensor(gains: Array, world: World, memory: Array, out: Array) -> int:
+    """What is measured of what acted: tau + b_m, with the last n gains b_m."""
+    n = world.tau_m.size
+    for i in range(n):
+        world.tau_m[i] += gains[n + i]
+    return GOES_ON
 
 
 class TorqueBiasConfig(DisturbanceConfig):
@@ -41,23 +61,9 @@ class TorqueBias(Disturbance):
     """Adds one bias (7,) [N m] to the torque that acts and another to the one measured."""
 
     rank = BIASED
+    kernels: Mapping[str, Any] = {"actuate": bias_drive, "sense": bias_sensor}
 
     def __init__(self, bias: Array, *, of: Literal["sensor", "drive", "loop"]) -> None:
-        self._acting = {"sensor": 0.0, "drive": 1.0, "loop": -1.0}[of] * bias
-        self._measured = {"sensor": 1.0, "drive": 0.0, "loop": 1.0}[of] * bias
-
-    def actuate(self, torque: Array) -> Array:
-        """What acts."""
-        return torque + self._acting
-
-    def sense(self, state: State) -> State:
-        """What is measured of what acted."""
-        return State(
-            t_s=state.t_s,
-            q=state.q,
-            v=state.v,
-            tau=state.tau + self._measured,
-            p_WC=state.p_WC,
-            v_WC=state.v_WC,
-            f_T=state.f_T,
-        )
+        acting = {"sensor": 0.0, "drive": 1.0, "loop": -1.0}[of] * bias
+        measured = {"sensor": 1.0, "drive": 0.0, "loop": 1.0}[of] * bias
+        self.gains = np.concatenate((acting, measured))

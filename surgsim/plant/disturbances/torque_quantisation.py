@@ -1,14 +1,27 @@
 """Torques in steps: the resolution of the drives."""
 
-from typing import Annotated, Literal
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
+from surgsim.compiled import compiled
 from surgsim.plant.disturbances.base import QUANTISED, Disturbance, DisturbanceConfig
+from surgsim.tick.arrays import World
+from surgsim.tick.status import GOES_ON
 
 Array = NDArray[np.float64]
+
+
+@compiled
+def quantise(gains: Array, world: World, memory: Array, out: Array) -> int:
+    """What acts: tau' = s round(tau / s) with the step s."""
+    step = gains[0]
+    for i in range(world.torque.size):
+        world.torque[i] = step * np.rint(world.torque[i] / step)
+    return GOES_ON
 
 
 class TorqueQuantisationConfig(DisturbanceConfig):
@@ -27,14 +40,10 @@ class TorqueQuantisationConfig(DisturbanceConfig):
 
 
 class TorqueQuantisation(Disturbance):
-    """tau' = s round(tau / s) with the step s."""
+    """Drives that know whole steps alone."""
 
     rank = QUANTISED
+    kernels: Mapping[str, Any] = {"actuate": quantise}
 
     def __init__(self, config: TorqueQuantisationConfig) -> None:
-        self._step = config.step_nm
-
-    def actuate(self, torque: Array) -> Array:
-        """`torque` in whole steps."""
-        rounded: Array = self._step * np.rint(torque / self._step)
-        return rounded
+        self.gains = np.array([config.step_nm])

@@ -1,11 +1,13 @@
 """A trocar that is not where the controller believes it to be."""
 
-from typing import Literal
+from collections.abc import Mapping
+from typing import Any, Literal
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from surgsim.compiled import compiled
 from surgsim.models.config import Vec3
 from surgsim.plant.disturbances.base import (
     Direction,
@@ -16,9 +18,18 @@ from surgsim.plant.disturbances.base import (
     spread_factor,
 )
 from surgsim.plant.disturbances.breathing import refuse_without_port
-from surgsim.plant.state import State
+from surgsim.tick.arrays import World
+from surgsim.tick.status import GOES_ON
 
 Array = NDArray[np.float64]
+
+
+@compiled
+def misplace(gains: Array, world: World, memory: Array, out: Array) -> int:
+    """The trocar where it is believed to be: p + e, with the error e as gains."""
+    for i in range(3):
+        world.p_WC_m[i] += gains[i]
+    return GOES_ON
 
 
 class TrocarCalibrationConfig(DisturbanceConfig):
@@ -44,21 +55,11 @@ class TrocarCalibrationConfig(DisturbanceConfig):
 class TrocarCalibration(Disturbance):
     """Adds the error (3,) [m] to the trocar's measured position, whether it is tracked or only known."""
 
+    kernels: Mapping[str, Any] = {"sense": misplace}
+
     def __init__(self, error: Array) -> None:
-        self._error = error
+        self.gains = error
 
     def modify(self, spec: mujoco.MjSpec) -> None:
         """Refuse a scenario without a trocar."""
         refuse_without_port(spec, "trocar_calibration")
-
-    def sense(self, state: State) -> State:
-        """The trocar where it is believed to be."""
-        return State(
-            t_s=state.t_s,
-            q=state.q,
-            v=state.v,
-            tau=state.tau,
-            p_WC=state.p_WC + self._error,
-            v_WC=state.v_WC,
-            f_T=state.f_T,
-        )

@@ -60,7 +60,7 @@ def _arrivals(disturbed, seed, ticks=2, jitter=3, n=4000):
     """Number of the command that acts at each tick."""
     config = ActuationDelayConfig(delay_s=ticks * disturbed.DT, jitter_s=jitter * disturbed.DT)
     delay = disturbed.started(config, seed)
-    return np.array([int(delay.actuate(np.full(7, float(k)))[0]) for k in range(n)])
+    return delay.actuate(np.tile(np.arange(float(n))[:, None], 7))[:, 0].astype(int)
 
 
 def test_with_jitter_every_command_is_late_by_its_own_time_and_none_overtakes(disturbed):

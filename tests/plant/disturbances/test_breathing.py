@@ -14,18 +14,20 @@ ZERO = np.zeros(7)
 seens = pytest.mark.parametrize("seen", ["announced", "tracked", "hidden"])
 
 
-def _built(seed=0, **keys):
-    return BreathingConfig(**keys).build(np.random.default_rng(seed))
+@pytest.fixture
+def built(disturbed):
+    """A breath of these keys."""
+    return lambda seed=0, **keys: disturbed.started(BreathingConfig(**keys), seed)
 
 
 def _motion(breathing, t=T):
     motions = [breathing.port_motion(x) for x in t]
-    return np.array([m.offset for m in motions]), np.array([m.velocity for m in motions])
+    return tuple(np.array(rows) for rows in zip(*motions, strict=True))
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_velocity_is_the_offset_s_exact_derivative_and_acceleration_has_no_step(seed):
-    breathing = _built(seed, random_phase=True, rate_hz=0.35, ramp_s=1.3, amplitude_m=0.02)
+def test_velocity_is_the_offset_s_exact_derivative_and_acceleration_has_no_step(built, seed):
+    breathing = built(seed, random_phase=True, rate_hz=0.35, ramp_s=1.3, amplitude_m=0.02)
     h = 1e-5
     ahead, behind = (_motion(breathing, T + sign * h)[0] for sign in (1, -1))
     velocity = _motion(breathing)[1]
@@ -34,8 +36,8 @@ def test_velocity_is_the_offset_s_exact_derivative_and_acceleration_has_no_step(
     assert np.abs(np.diff(acceleration, axis=0)).max() < 0.02 * np.abs(acceleration).max()
 
 
-def test_it_goes_from_the_configured_place_by_the_amplitude_and_back_with_1_to_1_5():
-    offset, _ = _motion(_built(direction=(0.0, 0.0, 2.0)))
+def test_it_goes_from_the_configured_place_by_the_amplitude_and_back_with_1_to_1_5(built):
+    offset, _ = _motion(built(direction=(0.0, 0.0, 2.0)))
     z = offset[:, 2]
     np.testing.assert_array_equal(offset[:, :2], 0.0)
     assert z.min() == 0.0
@@ -46,20 +48,20 @@ def test_it_goes_from_the_configured_place_by_the_amplitude_and_back_with_1_to_1
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_it_begins_at_rest_at_the_configured_place_at_any_point_of_the_breath(seed):
-    offset, velocity = _motion(_built(seed, random_phase=True))
+def test_it_begins_at_rest_at_the_configured_place_at_any_point_of_the_breath(built, seed):
+    offset, velocity = _motion(built(seed, random_phase=True))
     np.testing.assert_array_equal(offset[0], 0.0)
     np.testing.assert_array_equal(velocity[0], 0.0)
     assert np.abs(velocity[1]).max() < 1e-6
 
 
-def test_phase_and_excursion_are_drawn_from_the_seed():
+def test_phase_and_excursion_are_drawn_from_the_seed(built):
     def at(seed):
-        return _motion(_built(seed, random_phase=True, spread=0.2), [2.5, 4.0])[0]
+        return _motion(built(seed, random_phase=True, spread=0.2), [2.5, 4.0])[0]
 
     assert len({at(seed).tobytes() for seed in range(5)}) == 5
     np.testing.assert_array_equal(at(3), at(3))
-    peaks = [np.linalg.norm(_motion(_built(seed, spread=0.2))[0], axis=1).max() for seed in range(20)]
+    peaks = [np.linalg.norm(_motion(built(seed, spread=0.2))[0], axis=1).max() for seed in range(20)]
     assert min(peaks) >= 0.004 - 1e-9
     assert max(peaks) <= 0.006 + 1e-9
     assert np.ptp(peaks) > 0.0005
@@ -69,16 +71,16 @@ def test_phase_and_excursion_are_drawn_from_the_seed():
 def test_the_port_moves_and_the_controller_is_told_what_is_said(disturbed, seen):
     config = BreathingConfig(seen=seen, rate_hz=5.0, ramp_s=0.01)
     plant = disturbed.plant_of(config, trocar=True)
-    breathing = config.build(np.random.default_rng(0))
+    breathing = disturbed.started(config)
     state = plant.reset(np.full(7, 0.3))
     for k in range(1, 101):
         state = plant.step(ZERO, ZERO)
-        motion = breathing.port_motion(k * disturbed.DT)
-        true = disturbed.HOME + motion.offset
+        offset, velocity = breathing.port_motion(k * disturbed.DT)
+        true = disturbed.HOME + offset
         np.testing.assert_allclose(plant.truth().p_WC, true, atol=1e-15)
         known = disturbed.HOME if seen == "hidden" else true
         np.testing.assert_allclose(state.p_WC, known, atol=1e-15)
-        told = motion.velocity if seen == "announced" else np.zeros(3)
+        told = velocity if seen == "announced" else np.zeros(3)
         np.testing.assert_allclose(state.v_WC, told, atol=1e-15)
     assert np.abs(true - disturbed.HOME).max() > 0.003
 
@@ -96,18 +98,18 @@ def test_breaths_and_a_calibration_error_add_up_in_any_order(disturbed, order):
     plant.reset(np.full(7, 0.3))
     for _ in range(80):
         state = plant.step(ZERO, ZERO)
-    said, tracked, hidden = (config.build(np.random.default_rng(0)).port_motion(0.08) for config in breaths)
-    seen = disturbed.HOME + said.offset + tracked.offset
-    np.testing.assert_allclose(plant.truth().p_WC, seen + hidden.offset, atol=1e-15)
+    said, tracked, hidden = (disturbed.started(config).port_motion(0.08) for config in breaths)
+    seen = disturbed.HOME + said[0] + tracked[0]
+    np.testing.assert_allclose(plant.truth().p_WC, seen + hidden[0], atol=1e-15)
     np.testing.assert_allclose(state.p_WC, seen + error, atol=1e-15)
-    np.testing.assert_allclose(state.v_WC, said.velocity, atol=1e-15)
-    assert min(np.abs(m.offset).max() for m in (said, tracked, hidden)) > 1e-4
+    np.testing.assert_allclose(state.v_WC, said[1], atol=1e-15)
+    assert min(np.abs(offset).max() for offset, _ in (said, tracked, hidden)) > 1e-4
 
 
-def test_along_the_shaft_it_does_not_disturb_the_remote_centre_and_across_it_does():
+def test_along_the_shaft_it_does_not_disturb_the_remote_centre_and_across_it_does(built):
     tip, wrist = np.array([0.0, 0.0, -0.2]), np.array([0.0, 0.0, 0.2])
     along, across = (
-        _motion(_built(direction=direction), [2.0])[0][0] for direction in ((0, 0, 1.0), (1.0, 0, 0))
+        _motion(built(direction=direction), [2.0])[0][0] for direction in ((0, 0, 1.0), (1.0, 0, 0))
     )
     assert shaft_distance(along, tip, wrist) == pytest.approx(0.0, abs=1e-15)
     assert shaft_distance(across, tip, wrist) == pytest.approx(0.005)

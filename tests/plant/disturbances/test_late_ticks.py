@@ -10,7 +10,7 @@ N = 20000
 
 def _acting(disturbed, seed=0, **keys):
     """Number of the command that acts at each tick."""
-    late = disturbed.started(LateTicksConfig(**keys), seed)
+    late = disturbed.started(LateTicksConfig(**keys), seed).part
     return np.array([late.actuate(np.full(7, float(k)))[0] for k in range(N)])
 
 

@@ -4,21 +4,21 @@ import mujoco
 import numpy as np
 import pytest
 
-from surgsim.plant.disturbances.push import PushConfig
+from surgsim.plant.disturbances.push import PushConfig, push_level
 
 FORCE = np.array([3.0, -2.0, 4.0])
 POINTS = {"tip": 7, "shaft": 7, "elbow": 4, "wrist": 6}  # how many joints move it
 seeds = pytest.mark.parametrize("seed", range(3))
 
 
-def _joint_torque(scene, disturbance, q, t_s):
+def _joint_torque(push, t_s):
     """What the push adds to the smooth joint forces."""
-    data = mujoco.MjData(scene.model)
-    data.qpos[:] = q
-    mujoco.mj_forward(scene.model, data)
+    model, data = push.scene.model, push.data
+    data.xfrc_applied[:] = 0.0
+    mujoco.mj_forward(model, data)
     without = data.qfrc_smooth.copy()
-    disturbance.push(t_s, scene, data)
-    mujoco.mj_forward(scene.model, data)
+    push.push(t_s)
+    mujoco.mj_forward(model, data)
     return data.qfrc_smooth - without
 
 
@@ -27,22 +27,22 @@ def _joint_torque(scene, disturbance, q, t_s):
 def test_it_is_the_transposed_jacobian_times_the_force(arm, disturbed, random_q, seed, at):
     q = random_q(np.random.default_rng(seed))
     config = PushConfig(force_n=tuple(FORCE), at=at, distance_m=0.15, start_s=1.0, duration_s=1.0)
-    scene, (push,) = disturbed.scene_of(config)
+    push = disturbed.started(config, scene=disturbed.scene_of(config)[0], q=q)
     kin = arm.kinematics(q)
     shaft = kin.p_WT - 0.15 * kin.R_WT[:, 2]
     point = {"tip": kin.p_WT, "shaft": shaft, "elbow": kin.anchors_W[3], "wrist": kin.anchors_W[5]}[at]
     J = np.cross(kin.z_W, point - kin.anchors_W).T
     J[:, POINTS[at] :] = 0.0
-    np.testing.assert_allclose(_joint_torque(scene, push, q, 1.5), J.T @ FORCE, atol=1e-9)
-    np.testing.assert_array_equal(_joint_torque(scene, push, q, 0.5), 0.0)
-    half = _joint_torque(scene, push, q, 1.0 + 0.025)
+    np.testing.assert_allclose(_joint_torque(push, 1.5), J.T @ FORCE, atol=1e-9)
+    np.testing.assert_array_equal(_joint_torque(push, 0.5), 0.0)
+    half = _joint_torque(push, 1.0 + 0.025)
     np.testing.assert_allclose(half, 0.5 * J.T @ FORCE, atol=1e-9)
 
 
 def test_its_edges_are_smooth_and_outside_it_is_zero():
     push = PushConfig(start_s=2.0, duration_s=1.0, rise_s=0.2).build(np.random.default_rng(0))
     t = np.arange(1.5, 3.5, 1e-4)
-    level = np.array([push.level(x) for x in t])
+    level = np.array([push_level(push.gains, x) for x in t])
     outside = (t <= 2.0) | (t >= 3.0)
     np.testing.assert_array_equal(level[outside], 0.0)
     np.testing.assert_allclose(level[(t >= 2.2) & (t <= 2.8)], 1.0, atol=1e-12)
@@ -57,7 +57,7 @@ def test_its_edges_are_smooth_and_outside_it_is_zero():
 
 def test_a_push_shorter_than_its_edges_does_not_reach_its_force():
     push = PushConfig(start_s=0.0, duration_s=0.1, rise_s=0.1).build(np.random.default_rng(0))
-    assert max(push.level(t) for t in np.linspace(0.0, 0.1, 101)) == pytest.approx(0.5)
+    assert max(push_level(push.gains, t) for t in np.linspace(0.0, 0.1, 101)) == pytest.approx(0.5)
 
 
 @pytest.mark.parametrize("at", POINTS)
@@ -99,11 +99,11 @@ def test_two_pushes_add_up(disturbed, random_q):
 def test_a_random_direction_is_drawn_from_the_seed_and_keeps_the_size(disturbed):
     def force(seed):
         config = PushConfig(force_n=(3.0, 0.0, 4.0), direction="random")
-        return config.build(np.random.default_rng(seed))._force
+        return config.build(np.random.default_rng(seed)).gains[:3]
 
     drawn = np.array([force(seed) for seed in range(200)])
     np.testing.assert_allclose(np.linalg.norm(drawn, axis=1), 5.0)
     assert np.abs(drawn.mean(axis=0)).max() < 1.0  # all over the sphere
     np.testing.assert_array_equal(force(3), drawn[3])
-    given = PushConfig(force_n=(3.0, 0.0, 4.0)).build(np.random.default_rng(0))._force
+    given = PushConfig(force_n=(3.0, 0.0, 4.0)).build(np.random.default_rng(0)).gains[:3]
     np.testing.assert_array_equal(given, [3.0, 0.0, 4.0])

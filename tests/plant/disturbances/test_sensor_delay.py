@@ -14,7 +14,7 @@ NAMES = ("q", "v", "tau", "p_WC", "v_WC", "f_T")
 def test_the_whole_state_is_so_old_and_the_first_one_fills(disturbed, ticks):
     delay = disturbed.started(SensorDelayConfig(delay_s=ticks * disturbed.DT))
     states = [disturbed.state_at(k) for k in range(30)]
-    measured = [delay.sense(state) for state in states]
+    measured = delay.sense(states)
     assert [state.t_s for state in measured] == [state.t_s for state in states]
     for k, state in enumerate(measured):
         for name in NAMES:
@@ -23,10 +23,10 @@ def test_the_whole_state_is_so_old_and_the_first_one_fills(disturbed, ticks):
 
 def test_a_reset_empties_the_queue(disturbed):
     delay = disturbed.started(SensorDelayConfig())
-    for k in range(5):
-        delay.sense(disturbed.state_at(k))
-    delay.start(None, None, np.random.default_rng(0), disturbed.DT)
-    np.testing.assert_array_equal(delay.sense(disturbed.state_at(9)).q, disturbed.state_at(9).q)
+    delay.sense([disturbed.state_at(k) for k in range(5)])
+    delay.start(0)
+    late = disturbed.state_at(9)
+    np.testing.assert_array_equal(delay.sense([late])[0].q, late.q)
 
 
 @pytest.mark.parametrize("swapped", [False, True])
@@ -37,9 +37,9 @@ def test_what_is_told_of_a_breath_is_as_old_wherever_it_stands_in_the_list(distu
     plant.reset(np.full(7, 0.3))
     for _ in range(40):
         state = plant.step(np.zeros(7), np.zeros(7))
-    motion = breathing.build(np.random.default_rng(0)).port_motion(0.035)
-    np.testing.assert_allclose(state.p_WC, disturbed.HOME + motion.offset, atol=1e-15)
-    np.testing.assert_allclose(state.v_WC, motion.velocity, atol=1e-15)
+    offset, velocity = disturbed.started(breathing).port_motion(0.035)
+    np.testing.assert_allclose(state.p_WC, disturbed.HOME + offset, atol=1e-15)
+    np.testing.assert_allclose(state.v_WC, velocity, atol=1e-15)
 
 
 def test_a_delay_that_is_no_multiple_of_the_period_is_refused_with_the_scenario(scenario):

@@ -20,8 +20,7 @@ STD = {
 
 
 def _measured(disturbed, config, states, seed=0):
-    sensors = disturbed.started(config, seed)
-    return [sensors.sense(state) for state in states]
+    return disturbed.started(config, seed).sense(states)
 
 
 def _stack(states, name):
@@ -46,9 +45,9 @@ def test_each_sensor_has_white_noise_of_its_size_and_no_other(disturbed):
 def test_noise_repeats_from_the_seed_and_after_a_reset(disturbed):
     states = [disturbed.state_at(k) for k in range(600)]
     sensors = disturbed.started(SensorNoiseConfig(port_std_m=1e-4))
-    first = [sensors.sense(state) for state in states]
-    sensors.start(None, None, np.random.default_rng([0, 1]), disturbed.DT)
-    again = [sensors.sense(state) for state in states]
+    first = sensors.sense(states)
+    sensors.start([0, 1])
+    again = sensors.sense(states)
     other = _measured(disturbed, SensorNoiseConfig(port_std_m=1e-4), states, seed=1)
     for name in ("q", "v", "tau", "p_WC", "f_T"):
         np.testing.assert_array_equal(_stack(first, name), _stack(again, name))

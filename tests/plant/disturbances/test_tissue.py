@@ -5,6 +5,7 @@ import pytest
 
 from surgsim.errors import ScenarioError, SurgsimError
 from surgsim.plant.disturbances.tissue import FADE_M, TissueConfig, tissue_force
+from surgsim.plant.disturbances.tissue import LAW as LAW_GAINS
 from surgsim.simulate.setup import prepare
 
 POINT, NORMAL = np.array([0.1, 0.2, 0.3]), np.array([0.0, 0.6, 0.8])
@@ -116,7 +117,7 @@ def test_the_tip_s_sensor_measures_it(disturbed, arm):
 
 def test_its_law_is_drawn_from_the_seed():
     def law(seed):
-        return TissueConfig(spread=0.4).build(np.random.default_rng(seed))._law
+        return TissueConfig(spread=0.4).build(np.random.default_rng(seed)).gains[LAW_GAINS]
 
     drawn = np.array([law(seed) for seed in range(40)])
     assert (drawn >= 0.6 * np.array([200.0, 2.0, 5.0])).all()

@@ -10,7 +10,7 @@ ZERO = np.zeros(7)
 
 
 def _error(seed, **keys):
-    return TrocarCalibrationConfig(**keys).build(np.random.default_rng(seed))._error
+    return TrocarCalibrationConfig(**keys).build(np.random.default_rng(seed)).gains
 
 
 def test_the_known_place_is_beside_the_true_one_which_stays(disturbed):
