@@ -63,6 +63,8 @@ def as_parameter(kernel: Any, signature: Any) -> Any:
     It is compiled for this signature, or loaded, when it is first asked for; `@compiled(SIGNATURE)` would do
     so at import, when the number of joints is not yet known.
     """
+    if not is_jitted(kernel):  # numba is told to leave Python functions alone
+        return kernel
     key = (kernel.py_func, signature)
     if key not in _AS_PARAMETERS:
         _AS_PARAMETERS[key] = compiled(signature)(kernel.py_func)

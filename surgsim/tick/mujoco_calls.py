@@ -3,10 +3,13 @@
 `m` and `d` are the addresses of model and data; whoever holds them must hold the objects too.
 """
 
+import ctypes
 from pathlib import Path
+from typing import Any
 
 import llvmlite.binding
 import mujoco
+import numba
 from numba import types
 
 _SYMBOLS = (
@@ -25,8 +28,8 @@ _SYMBOLS = (
 )
 
 
-def _load() -> None:
-    """Make the symbols of MuJoCo's own library known to compiled code.
+def _load() -> str:
+    """Make the symbols of MuJoCo's own library known to compiled code; the library's file.
 
     Raises:
         ImportError: If the library is not beside MuJoCo's package, or lacks a symbol.
@@ -41,19 +44,32 @@ def _load() -> None:
     missing = [name for name in _SYMBOLS if not llvmlite.binding.address_of_symbol(name)]
     if missing:
         raise ImportError(f"{found[0]} has no {', '.join(missing)}; surgsim needs MuJoCo 4")
+    return str(found[0])
 
 
-_load()
+_LIBRARY = _load()
 _P, _I = types.intp, types.int32
-mj_step1 = types.ExternalFunction("mj_step1", types.void(_P, _P))
-mj_step2 = types.ExternalFunction("mj_step2", types.void(_P, _P))
-mj_kinematics = types.ExternalFunction("mj_kinematics", types.void(_P, _P))
-mj_comPos = types.ExternalFunction("mj_comPos", types.void(_P, _P))
-mj_comVel = types.ExternalFunction("mj_comVel", types.void(_P, _P))
-mj_makeM = types.ExternalFunction("mj_makeM", types.void(_P, _P))
-mj_fullM = types.ExternalFunction("mj_fullM", types.void(_P, _P, _P))
-mj_rne = types.ExternalFunction("mj_rne", types.void(_P, _P, _I, _P))
-mj_rnePostConstraint = types.ExternalFunction("mj_rnePostConstraint", types.void(_P, _P))
-mj_jacSite = types.ExternalFunction("mj_jacSite", types.void(_P, _P, _P, _P, _I))
-mj_mulM = types.ExternalFunction("mj_mulM", types.void(_P, _P, _P, _P))
-mj_objectVelocity = types.ExternalFunction("mj_objectVelocity", types.void(_P, _P, _I, _I, _P, _I))
+
+
+def _function(name: str, *arguments: Any) -> Any:
+    """A function of MuJoCo by its symbol; through ctypes where kernels run as Python (NUMBA_DISABLE_JIT)."""
+    if not numba.config.DISABLE_JIT:
+        return types.ExternalFunction(name, types.void(*arguments))
+    function = getattr(ctypes.CDLL(_LIBRARY), name)
+    function.argtypes = [ctypes.c_void_p if kind is _P else ctypes.c_int for kind in arguments]
+    function.restype = None
+    return lambda *values: function(*map(int, values))
+
+
+mj_step1 = _function("mj_step1", _P, _P)
+mj_step2 = _function("mj_step2", _P, _P)
+mj_kinematics = _function("mj_kinematics", _P, _P)
+mj_comPos = _function("mj_comPos", _P, _P)
+mj_comVel = _function("mj_comVel", _P, _P)
+mj_makeM = _function("mj_makeM", _P, _P)
+mj_fullM = _function("mj_fullM", _P, _P, _P)
+mj_rne = _function("mj_rne", _P, _P, _I, _P)
+mj_rnePostConstraint = _function("mj_rnePostConstraint", _P, _P)
+mj_jacSite = _function("mj_jacSite", _P, _P, _P, _P, _I)
+mj_mulM = _function("mj_mulM", _P, _P, _P, _P)
+mj_objectVelocity = _function("mj_objectVelocity", _P, _P, _I, _I, _P, _I)

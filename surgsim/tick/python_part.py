@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from llvmlite import ir
 from numba import types
-from numba.extending import intrinsic
+from numba.extending import intrinsic, overload
 
 from surgsim.compiled import compiled
 from surgsim.tick.arrays import Array
@@ -69,7 +69,20 @@ def _enter_address(context: Any, address: Any) -> Any:
     return types.int64(types.float64), generate
 
 
+def _enter_part(bits: float) -> int:
+    """The same in Python."""
+    return int(_CALL(int(np.float64(bits).view(np.int64)))())
+
+
+@overload(_enter_part)
+def _enter_part_in_kernels(bits: Any) -> Any:
+    def enter(bits: Any) -> Any:
+        return _enter_address(bits)
+
+    return enter
+
+
 @compiled
 def python_kernel(gains: Any, seen: Any, memory: Any, out: Any) -> int:
     """The trampoline of every kind of kernel: ask the Python part whose address is the first gain."""
-    return _enter_address(gains[0])
+    return _enter_part(gains[0])

@@ -33,26 +33,44 @@ for catalog, make, call in (
         if not hasattr(part, "kernel"):
             continue
         memory = None
-        for seed in range(3):
+        for seed in range(4):
             found, memory = getattr(part, call)(make(seed), memory)
             values = found if call == "torque" else found.qdot
             print(name, seed, values.tobytes().hex(), memory.tobytes().hex())
 """
 
 
-def _answers(*, compiled):
+def _printed(program, *, compiled):
     environment = {**os.environ, "NUMBA_DISABLE_JIT": "0" if compiled else "1"}
     found = subprocess.run(
-        [sys.executable, "-c", ANSWERS], env=environment, capture_output=True, text=True, timeout=300
+        [sys.executable, "-c", program], env=environment, capture_output=True, text=True, timeout=300
     )
     assert found.returncode == 0, found.stderr
     return found.stdout.splitlines()
 
 
 def test_the_python_form_of_a_law_gives_the_bits_of_the_compiled_one():
-    python, compiled = _answers(compiled=False), _answers(compiled=True)
+    python, compiled = (_printed(ANSWERS, compiled=compiled) for compiled in (False, True))
     names = {line.split()[0] for line in python}
     assert {"pinv", "gradient", "rnn", "vprnn", "joint_impedance", "rcm_inverse_dynamics"} <= names
+    assert python == compiled
+
+
+RUN = """
+from surgsim.scenario.load import load_scenario
+from surgsim.simulate.loop import simulate
+
+short = ["task.duration_s=0.12", "task.ramp_s=0.05", "task.hold_start_s=0", "task.hold_end_s=0"]
+small = ["theatre=false", "task.radius_m=0.002"]
+for controller in ("vprnn", "rcm_inverse_dynamics"):
+    trace = simulate(load_scenario("circle_lwr4plus", controller=controller, assignments=[*short, *small]))
+    print(controller, trace.block("q").tobytes().hex(), trace.block("tau").tobytes().hex())
+"""
+
+
+def test_a_whole_run_in_python_gives_the_bits_of_the_compiled_loop():
+    python, compiled = (_printed(RUN, compiled=compiled) for compiled in (False, True))
+    assert len(python) == 2
     assert python == compiled
 
 
