@@ -90,7 +90,7 @@ class ArmModel:
         data = self._data if shared else mujoco.MjData(model)
         if not shared:
             self._held.append(data)
-        record.model, record.data, record.site = model._address, data._address, site
+        record.mj_model, record.mj_data, record.site = model._address, data._address, site
         record.qpos, record.qvel = data.qpos.ctypes.data, data.qvel.ctypes.data
         record.site_xpos, record.site_xmat = (
             data.site_xpos[site].ctypes.data,

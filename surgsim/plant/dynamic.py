@@ -126,7 +126,7 @@ def see_arm(world: World) -> None:
 def begin(world: World, bore: Bore, hooks: Hooks, functions: Any) -> int:
     """The first instant of a run: the arm at rest is held by the torques that it needs."""
     status = clear_forces(world, bore, hooks, functions, 0.0)
-    mj_step1(world.model, world.data)
+    mj_step1(world.mj_model, world.mj_data)
     gravity = vector(world.qfrc_bias, world.nv)
     for i in range(world.q.size):
         world.tau[i] = gravity[world.first_dof + i]
@@ -136,7 +136,7 @@ def begin(world: World, bore: Bore, hooks: Hooks, functions: Any) -> int:
 @compiled
 def advance_dynamics(world: World, bore: Bore, hooks: Hooks, functions: Any) -> int:
     """Let `world.torque`, saturated at the limits, act for one control period."""
-    m, d, ctrl = world.model, world.data, vector(world.ctrl, world.first_ctrl + world.q.size)
+    m, d, ctrl = world.mj_model, world.mj_data, vector(world.ctrl, world.first_ctrl + world.q.size)
     for i in range(world.q.size):
         world.torque[i] = min(max(world.torque[i], -world.tau_max[i]), world.tau_max[i])
     status = call_hooks(ACTUATE, functions, hooks, world)

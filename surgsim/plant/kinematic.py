@@ -47,7 +47,7 @@ class KinematicPlantConfig(PartConfig):
 @compiled
 def look_at_kinematics(world: World) -> None:
     """Place the model and fill what is true and measured."""
-    mj_kinematics(world.model, world.data)
+    mj_kinematics(world.mj_model, world.mj_data)
     see_arm(world)
 
 

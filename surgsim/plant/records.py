@@ -40,7 +40,7 @@ def world_of(
     """The record of a plant in MuJoCo's `data`, which must outlive it."""
     model, n = scene.model, len(scene.dof_ids)
     world = new(World, n)
-    world.model, world.data = model._address, data._address
+    world.mj_model, world.mj_data = model._address, data._address
     for name in _ARRAYS:
         setattr(world, name, getattr(data, name).ctypes.data)
     world.nq, world.nv, world.nbody = model.nq, model.nv, model.nbody

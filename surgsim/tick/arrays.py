@@ -67,8 +67,8 @@ class Model(Record):
     """The controller's own model of the arm, evaluated at one state (`surgsim.tick.nominal`).
 
     Attributes:
-        model: Address of MuJoCo's model.
-        data: Address of MuJoCo's data, of this record alone.
+        mj_model: Address of MuJoCo's model.
+        mj_data: Address of MuJoCo's data, of this record alone.
         qpos: Address of the joint positions in it; as the next five, of what it says by that name.
         qvel: Of the joint velocities.
         site_xpos: Of the tip's place.
@@ -102,8 +102,8 @@ class Model(Record):
         "bias": "n",
         "damping": "n",
     }
-    model: int
-    data: int
+    mj_model: int
+    mj_data: int
     qpos: int
     qvel: int
     site_xpos: int
@@ -372,8 +372,8 @@ class World(Record):
     MuJoCo's own arrays are read through the functions of `surgsim.tick.views`.
 
     Attributes:
-        model: Address of MuJoCo's model.
-        data: Address of MuJoCo's data.
+        mj_model: Address of MuJoCo's model.
+        mj_data: Address of MuJoCo's data.
         xaxis: Address of the joints' axes; as the following, of the array of MuJoCo's data by that name.
         xanchor: Points on them.
         qpos: All positions.
@@ -442,8 +442,8 @@ class World(Record):
         **{name: "3" for name in ("p_WT", "p_WR", "p_WC", "f_C", "f_T", "p_WC_m", "v_WC_m", "f_T_m")},
         **{name: "3" for name in ("port_home", "port_offset", "port_velocity")},
     }
-    model: int
-    data: int
+    mj_model: int
+    mj_data: int
     xaxis: int
     xanchor: int
     qpos: int

@@ -23,9 +23,9 @@ def kinematics(model: Model, q: Array) -> None:
     qpos = vector(model.qpos, n)
     for i in range(n):
         qpos[i] = model.q[i] = q[i]
-    mj_kinematics(model.model, model.data)
-    mj_comPos(model.model, model.data)
-    mj_jacSite(model.model, model.data, model.Jv_WT.ctypes.data, model.Jw_WT.ctypes.data, model.site)
+    mj_kinematics(model.mj_model, model.mj_data)
+    mj_comPos(model.mj_model, model.mj_data)
+    mj_jacSite(model.mj_model, model.mj_data, model.Jv_WT.ctypes.data, model.Jw_WT.ctypes.data, model.site)
     place, turn = vector(model.site_xpos, 3), doubles(model.site_xmat, 3, 3)
     axes, anchors = doubles(model.xaxis, n, 3), doubles(model.xanchor, n, 3)
     for k in range(3):
@@ -43,10 +43,10 @@ def dynamics(model: Model, v: Array) -> None:
     qvel = vector(model.qvel, v.size)
     for i in range(v.size):
         qvel[i] = model.v[i] = v[i]
-    mj_comVel(model.model, model.data)
-    mj_rne(model.model, model.data, 0, model.bias.ctypes.data)
-    mj_makeM(model.model, model.data)
-    mj_fullM(model.model, model.data, model.M.ctypes.data)
+    mj_comVel(model.mj_model, model.mj_data)
+    mj_rne(model.mj_model, model.mj_data, 0, model.bias.ctypes.data)
+    mj_makeM(model.mj_model, model.mj_data)
+    mj_fullM(model.mj_model, model.mj_data, model.M.ctypes.data)
 
 
 @compiled

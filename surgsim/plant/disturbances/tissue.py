@@ -61,7 +61,7 @@ def press(gains: Array, world: World, memory: Array, out: Array) -> int:
     if dot(gains[NORMAL], gains[POINT] - tip) <= 0.0:
         return GOES_ON
     moving = np.empty(6)  # angular, then linear
-    mj_objectVelocity(world.model, world.data, _SITE, world.tip, moving.ctypes.data, 0)
+    mj_objectVelocity(world.mj_model, world.mj_data, _SITE, world.tip, moving.ctypes.data, 0)
     force = tissue_force(tip, moving[3:], gains[POINT], gains[NORMAL], gains[LAW])
     push_at(world, world.jaws, tip, force)
     return GOES_ON
