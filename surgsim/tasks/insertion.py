@@ -7,19 +7,107 @@ from pydantic import Field, NonNegativeFloat, PositiveFloat, model_validator
 
 from surgsim.catalog import PartConfig
 from surgsim.columns import scalar
+from surgsim.compiled import compiled
 from surgsim.models.config import TrocarConfig, Vec3
 from surgsim.spatial import unit
 from surgsim.tasks.base import Array, Feedback, TipCommand
-from surgsim.tasks.profile import Profile
+from surgsim.tasks.profile import progress
 from surgsim.tasks.success import PATH_NEEDS, RunColumns, Success
+from surgsim.tick import arrays
+from surgsim.tick.algebra import dot, norm
+from surgsim.tick.blank import new_command, new_feedback
+from surgsim.tick.status import GOES_ON
 
 _REACH_SAMPLES = 60
 _ALIGNED_M = 0.02  # nearer to the port, tip and trocar alone do not say how the shaft is turned
 _ARRIVED_M = 1e-3
 _BESIDE_M = 1e-3
-_AT_REST = np.zeros(3)
 TO_TARGET = 2.0
 """Value of the column `insertion_phase` once the tip is at depth and on the way to the target."""
+PORT, AXIS, FROM, INSIDE, TARGET = (slice(3 * k, 3 * k + 3) for k in range(5))
+LED, DEPTH, HELD, GIVE_WAY, LET_GO, END = range(15, 21)
+FIRST, SECOND = slice(21, 24), slice(24, 27)
+"""Gains: places and axis (3,) [m]; whether a hand leads; config's depth_m, held_m, give_way, let_go_s and
+hold_end_s; hold, duration and ramp of both motions [s], a duration of 0 if there is no second."""
+ARRIVED, SINCE = 0, 1
+"""Memory: whether the tip came to its depth, and when [s]."""
+
+
+@compiled
+def _depth(gains: Array, p: Array) -> float:
+    """How deep a point is in the patient, along the axis [m]."""
+    return dot(gains[PORT] - p, gains[AXIS])
+
+
+@compiled
+def _rest(out: arrays.Command, p: Array) -> None:
+    """At rest at `p`, the shaft through the trocar."""
+    for i in range(3):
+        out.p_WTd[i] = p[i]
+        out.v_WTd[i] = out.a_WTd[i] = out.rcm_shift[i] = out.rcm_shift_rate[i] = 0.0
+
+
+@compiled
+def _hold(gains: Array, out: arrays.Command) -> None:
+    """Shift the remote centre to `held_m` behind a tip that is on the axis and not yet so deep."""
+    deep = _depth(gains, out.p_WTd)
+    back = gains[HELD] - deep
+    if back <= 0.0 or abs(norm(gains[PORT] - out.p_WTd) - abs(deep)) > 1e-9:
+        return
+    along = dot(out.v_WTd, gains[AXIS])
+    for i in range(3):
+        out.rcm_shift[i], out.rcm_shift_rate[i] = back * gains[AXIS][i], along * gains[AXIS][i]
+
+
+@compiled
+def _along(gains: Array, times: Array, t_s: float, a: Array, b: Array, out: arrays.Command) -> None:
+    """On the straight way from `a` to `b`."""
+    s, s_dot, s_ddot = progress(times[0], times[1], times[2], t_s)
+    for i in range(3):
+        way = b[i] - a[i]
+        out.p_WTd[i], out.v_WTd[i], out.a_WTd[i] = a[i] + s * way, s_dot * way, s_ddot * way
+    _hold(gains, out)
+
+
+@compiled
+def _led(gains: Array, feedback: arrays.Feedback, out: arrays.Command) -> None:
+    """The tip's own place and speed along the axis, its place on the axis across it."""
+    height = -min(_depth(gains, feedback.p_WT), gains[DEPTH])
+    speed = gains[GIVE_WAY] * dot(feedback.v_WT, gains[AXIS])
+    for i in range(3):
+        out.p_WTd[i], out.v_WTd[i] = gains[PORT][i] + height * gains[AXIS][i], speed * gains[AXIS][i]
+    _hold(gains, out)
+
+
+@compiled
+def _since_arrival(gains: Array, feedback: arrays.Feedback, memory: Array) -> float:
+    """Time since the hand brought the tip to its depth [s]; -1 before."""
+    if memory[ARRIVED] == 0.0 and _depth(gains, feedback.p_WT) >= gains[DEPTH] - _ARRIVED_M:
+        memory[ARRIVED], memory[SINCE] = 1.0, feedback.t_s
+    return feedback.t_s - memory[SINCE] if memory[ARRIVED] == 1.0 else -1.0
+
+
+@compiled
+def insert(gains: Array, feedback: arrays.Feedback, memory: Array, out: arrays.Command) -> int:
+    """Two straight motions with smooth profiles; the first is planned or led by hand."""
+    out.finished = 0
+    if gains[LED] == 1.0:
+        since = _since_arrival(gains, feedback, memory)
+        after = since - gains[LET_GO] if since >= 0.0 else -1.0
+        if since >= gains[LET_GO] + gains[SECOND][1] + gains[END]:
+            out.finished = 1
+    else:
+        after = feedback.t_s - gains[FIRST][0] - gains[FIRST][1]
+    _rest(out, gains[INSIDE])
+    if after >= 0.0 and gains[SECOND][1] > 0.0:
+        _along(gains, gains[SECOND], after, gains[INSIDE], gains[TARGET], out)
+    elif after < 0.0 and gains[LED] == 1.0:
+        _led(gains, feedback, out)
+    elif after < 0.0:
+        _along(gains, gains[FIRST], feedback.t_s, gains[FROM], gains[INSIDE], out)
+    out.values[0] = _depth(gains, out.p_WTd)
+    out.values[1] = TO_TARGET if after >= 0.0 else 1.0 if out.values[0] >= 0.0 else 0.0
+    return GOES_ON
 
 
 class InsertionConfig(PartConfig):
@@ -89,32 +177,44 @@ class InsertionConfig(PartConfig):
 
 
 class Insertion:
-    """Two straight motions with smooth profiles; the first is planned or led by hand.
+    """Goes in along the axis, then to the target: `insert`.
 
     Near the port the point through which the shaft passes says little about how it is turned, and nothing
     when the tip is in it: with tip and trocar one, the RCM rows are rows of the tip's own. Every point of
     the port's axis serves as well while the tip moves along it, so the command shifts the remote centre back
     along the axis, to `held_m` behind the tip.
+
+    Attributes:
+        kernel: status = kernel(gains, feedback, memory, out).
+        gains: Its numbers, see `PORT` and the following.
+        memory: Its memory, see `ARRIVED` and the following.
     """
 
     columns = (scalar("insertion_depth", "m"), scalar("insertion_phase"))
+    kernel = staticmethod(insert)
 
     def __init__(self, config: InsertionConfig, start: Array, trocar: TrocarConfig) -> None:
         self._c = config
-        self._port, self._axis = np.array(trocar.position_m), unit(np.array(trocar.axis))
-        above = start - self._port
-        height = float(above @ self._axis)
-        if height <= 0.0 or np.linalg.norm(above - height * self._axis) > _BESIDE_M:
+        port, axis = np.array(trocar.position_m), unit(np.array(trocar.axis))
+        above = start - port
+        height = float(above @ axis)
+        if height <= 0.0 or np.linalg.norm(above - height * axis) > _BESIDE_M:
             raise ValueError("start_m must be on the port's axis, outside the patient")
-        self._start = self._port + height * self._axis
-        self._inside = self._port - config.depth_m * self._axis
+        self._start, self._inside = port + height * axis, port - config.depth_m * axis
         offset = config.target_from_port_m
-        self._target = self._inside if offset is None else self._port + np.array(offset)
-        first = config.depth_m + height
-        second = float(np.linalg.norm(self._target - self._inside))
-        self._first = _profile(config, first / (first + second), config.hold_start_s)
-        self._second = _profile(config, second / (first + second), 0.0) if second > 0.0 else None
-        self.reset()
+        self._target = self._inside if offset is None else port + np.array(offset)
+        first, second = config.depth_m + height, float(np.linalg.norm(self._target - self._inside))
+        share = first / (first + second)
+        numbers = (float(self.reacts), config.depth_m, config.held_m, config.give_way, config.let_go_s)
+        self.gains = np.concatenate(
+            [
+                *(port, axis, self._start, self._inside, self._target),
+                *(numbers, (config.hold_end_s,)),
+                *(_times(config, share, config.hold_start_s), _times(config, second / (first + second), 0.0)),
+            ]
+        )
+        self.memory = np.zeros(2)
+        self._out, self._told = new_command(), new_feedback()
 
     @property
     def duration_s(self) -> float:
@@ -131,71 +231,39 @@ class Insertion:
         ends = [(self._start, self._inside), (self._inside, self._target)]
         shares = np.linspace(0.0, 1.0, _REACH_SAMPLES)
         points = [a + s * (b - a) for a, b in ends for s in shares]
-        return [("the path point", p) for p in points if abs(self._depth(p)) >= _ALIGNED_M]
+        return [("the path point", p) for p in points if abs(_depth(self.gains, p)) >= _ALIGNED_M]
 
     def reset(self) -> None:
         """Forget the last run."""
-        self._arrived_s: float | None = None
-        self._values = np.zeros(2)
+        self.memory[:] = 0.0
 
     def command(self, t_s: float, feedback: Feedback | None = None) -> TipCommand:
-        """Desired tip motion at `t_s` [s]."""
-        if feedback is None:
-            after = t_s - self._first.hold_start_s - self._first.duration_s
-        else:
-            if self._arrived_s is None and self._depth(feedback.p_WT) >= self._c.depth_m - _ARRIVED_M:
-                self._arrived_s = t_s
-            after = -1.0 if self._arrived_s is None else t_s - self._arrived_s - self._c.let_go_s
-        if after >= 0.0:
-            command = self._to_target(after)
-        elif feedback is None:
-            command = self._along(self._first, t_s, self._start, self._inside)
-        else:
-            command = self._led(feedback)
-        depth = self._depth(command.p_WTd)
-        self._values = np.array([depth, TO_TARGET if after >= 0.0 else float(depth >= 0.0)])
-        return command
+        """Desired tip motion at `t_s` [s]; without feedback the tip is taken to be at rest at the start."""
+        told, out = self._told, self._out
+        told.t_s = t_s
+        told.p_WT[:] = self._start if feedback is None else feedback.p_WT
+        told.v_WT[:] = 0.0 if feedback is None else feedback.v_WT
+        self.kernel(self.gains, told, self.memory, out)
+        return TipCommand(
+            p_WTd=out.p_WTd.copy(),
+            v_WTd=out.v_WTd.copy(),
+            a_WTd=out.a_WTd.copy(),
+            rcm_shift=out.rcm_shift.copy(),
+            rcm_shift_rate=out.rcm_shift_rate.copy(),
+        )
 
     def values(self) -> Array:
         """Depth [m] of the commanded tip; 0 outside, 1 on the axis inside, 2 on the way to the target."""
-        return self._values
+        values: Array = self._out.values[:2].copy()
+        return values
 
     def finished(self, t_s: float) -> bool:
         """Whether a hand-led insertion is over."""
-        if self._arrived_s is None:
-            return False
-        moving = 0.0 if self._second is None else self._second.duration_s
-        return t_s - self._arrived_s >= self._c.let_go_s + moving + self._c.hold_end_s
-
-    def _depth(self, p: Array) -> float:
-        return float((self._port - p) @ self._axis)
-
-    def _to_target(self, after_s: float) -> TipCommand:
-        if self._second is None:
-            return TipCommand(p_WTd=self._inside, v_WTd=_AT_REST, a_WTd=_AT_REST)
-        return self._along(self._second, after_s, self._inside, self._target)
-
-    def _along(self, profile: Profile, t_s: float, a: Array, b: Array) -> TipCommand:
-        s, s_dot, s_ddot = profile.progress(t_s)
-        way = b - a
-        return self._held(a + s * way, s_dot * way, s_ddot * way)
-
-    def _led(self, feedback: Feedback) -> TipCommand:
-        """The tip's own place and speed along the axis, its place on the axis across it."""
-        height = -min(self._depth(feedback.p_WT), self._c.depth_m)
-        speed = self._c.give_way * float(feedback.v_WT @ self._axis)
-        return self._held(self._port + height * self._axis, speed * self._axis, _AT_REST)
-
-    def _held(self, p: Array, v: Array, a: Array) -> TipCommand:
-        back = self._c.held_m - self._depth(p)
-        if back <= 0.0 or abs(np.linalg.norm(self._port - p) - abs(self._depth(p))) > 1e-9:
-            return TipCommand(p_WTd=p, v_WTd=v, a_WTd=a)
-        along = float(v @ self._axis) * self._axis
-        return TipCommand(p_WTd=p, v_WTd=v, a_WTd=a, rcm_shift=back * self._axis, rcm_shift_rate=along)
+        wait = self._c.let_go_s + self.gains[SECOND][1] + self._c.hold_end_s
+        return bool(self.memory[ARRIVED] == 1.0 and t_s - self.memory[SINCE] >= wait)
 
 
-def _profile(config: InsertionConfig, share: float, hold_s: float) -> Profile:
-    """Profile of one motion that takes `share` of the time."""
+def _times(config: InsertionConfig, share: float, hold_s: float) -> tuple[float, float, float]:
+    """Hold, duration and ramp of one motion that takes `share` of the time [s]."""
     duration = share * config.duration_s
-    ramp = min(config.ramp_s, 0.5 * duration)
-    return Profile(hold_start_s=hold_s, duration_s=duration, ramp_s=ramp, hold_end_s=0.0)
+    return hold_s, duration, min(config.ramp_s, 0.5 * duration)

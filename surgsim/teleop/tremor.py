@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 from pydantic import NonNegativeFloat, PositiveFloat
 
 from surgsim.catalog import PartConfig
+from surgsim.compiled import compiled
 
 Array = NDArray[np.float64]
 _BLOCK = 256
@@ -24,19 +25,33 @@ class TremorConfig(PartConfig):
     width_hz: PositiveFloat = 2.0
 
 
-class Tremor:
-    """Second-order resonance driven by white noise, with unit variance times rms_m^2 per axis.
+def resonance(config: TremorConfig, period_s: float) -> tuple[float, float, float]:
+    """Gains (a_1, a_2, g) of `shake` for a period [s]; g makes the stationary standard deviation rms_m.
 
-    x_k = 2 r cos(theta) x_{k-1} - r^2 x_{k-2} + g w_k, r = exp(-pi width T), theta = 2 pi centre T; g
-    makes the stationary standard deviation rms_m.
+    a_1 = 2 r cos(theta), a_2 = -r^2, r = exp(-pi width T), theta = 2 pi centre T.
     """
+    r = math.exp(-math.pi * config.width_hz * period_s)
+    a1, a2 = 2.0 * r * math.cos(2.0 * math.pi * config.centre_hz * period_s), -r * r
+    variance = (1.0 - a2) / ((1.0 + a2) * ((1.0 - a2) ** 2 - a1 * a1))
+    return a1, a2, config.rms_m / math.sqrt(variance)
+
+
+@compiled
+def shake(a1: float, a2: float, noise: Array, last: Array, before: Array) -> None:
+    """Next displacement, in `last`, and the one before it (3,) [m].
+
+    x_k = a_1 x_{k-1} + a_2 x_{k-2} + g w_k with the noise g w_k.
+    """
+    for i in range(last.size):
+        new = a1 * last[i] + a2 * before[i] + noise[i]
+        before[i], last[i] = last[i], new
+
+
+class Tremor:
+    """Second-order resonance driven by white noise, with unit variance times rms_m^2 per axis: `shake`."""
 
     def __init__(self, config: TremorConfig, period_s: float, rng: np.random.Generator) -> None:
-        r = math.exp(-math.pi * config.width_hz * period_s)
-        a1, a2 = 2.0 * r * math.cos(2.0 * math.pi * config.centre_hz * period_s), -r * r
-        variance = (1.0 - a2) / ((1.0 + a2) * ((1.0 - a2) ** 2 - a1 * a1))
-        self._a1, self._a2 = a1, a2
-        self._gain = config.rms_m / math.sqrt(variance)
+        self._a1, self._a2, self._gain = resonance(config, period_s)
         self._period_s = period_s
         self._rng = rng
         self._last, self._before = np.zeros(3), np.zeros(3)
@@ -46,7 +61,6 @@ class Tremor:
         """Next displacement (3,) [m] and velocity (3,) [m/s]."""
         if self._used == len(self._noise):
             self._noise, self._used = self._gain * self._rng.standard_normal((_BLOCK, 3)), 0
-        new = self._a1 * self._last + self._a2 * self._before + self._noise[self._used]
+        shake(self._a1, self._a2, self._noise[self._used], self._last, self._before)
         self._used += 1
-        self._before, self._last = self._last, new
-        return new, (new - self._before) / self._period_s
+        return self._last.copy(), (self._last - self._before) / self._period_s
