@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from surgsim.compiled import compiled
 from surgsim.control.bounds import BRAKING_SHARE, stopping_speed
-from surgsim.tick.algebra import times
+from surgsim.tick.algebra import dot, times
 from surgsim.tick.arrays import Seen
 from surgsim.tick.quadratic_program import SOLVED, solve
 from surgsim.tick.status import GOES_ON, INFEASIBLE
@@ -91,13 +91,14 @@ def prioritised(
     n, m = posture.size, J.shape[0]
     rows = np.empty((n + m, n))
     lower, upper = np.empty(n + m), np.empty(n + m)
-    H, f = np.empty((n, n)), np.empty(n)
+    H, f, value = np.empty((n, n)), np.empty(n), np.empty(n + m)
     work, active, side = (
         np.zeros((2 * n + 7, n + 1)),
         np.zeros(n + 1, np.int64),
         np.zeros(2 * n + m, np.int64),
     )
     rows[:n] = M
+    least, most = low.copy(), high.copy()
     for i in range(n):
         lower[i], upper[i] = -torque_limit[i] - constant[i], torque_limit[i] - constant[i]
     held = n
@@ -113,19 +114,28 @@ def prioritised(
             for i in range(n):
                 f[i] = -f[i]
         found = solve(
-            H, f, low, high, rows[:held], lower[:held], upper[:held], side[: n + held], qddot, work, active
+            H, f, least, most, rows[:held], lower[:held], upper[:held], side[: n + held], qddot, work, active
         )
         if found != SOLVED:
             return INFEASIBLE
+        if level == 2:
+            break
+        times(rows[:held], qddot, value[:held])
+        _admit(value[:held], lower, upper)
+        _admit(qddot, least, most)
         for i in range(begin, end):
-            if level < 2:
-                s = 0.0
-                for j in range(n):
-                    rows[held, j] = J[i, j]
-                    s += J[i, j] * qddot[j]
-                lower[held], upper[held] = s - _SLACK, s + _SLACK
-                held += 1
+            rows[held] = J[i]
+            s = dot(J[i], qddot)
+            lower[held], upper[held] = s - _SLACK, s + _SLACK
+            held += 1
     return GOES_ON
+
+
+@compiled
+def _admit(x: Array, low: Array, high: Array) -> None:
+    """Widen bounds by the rounding that x (k,) misses them by: no reason to lose the next level."""
+    for i in range(x.size):
+        low[i], high[i] = min(low[i], x[i]), max(high[i], x[i])
 
 
 @compiled

@@ -32,6 +32,7 @@ FEASIBLE = 1e-9
 _DEPENDENT = 1e-10
 _DUAL = 1e-12
 _EQUALITY = 2
+_LEFT = 3  # a row that depends on the active ones, and is missed by no more than rounding explains
 
 
 def workspace(n: int, rows: int) -> tuple[Array, Ids, Ids]:
@@ -265,6 +266,16 @@ def _exchange(
 
 
 @compiled
+def _look_again(side: Ids, left: int) -> int:
+    """The active rows have changed, so that the rows which were left are looked at again; 0."""
+    if left > 0:
+        for k in range(side.size):
+            if side[k] == _LEFT:
+                side[k] = 0
+    return 0
+
+
+@compiled
 def solve(
     H: Array,
     f: Array,
@@ -311,6 +322,7 @@ def solve(
     if q < 0:
         return INFEASIBLE
     newest = barred = -1
+    left = 0
     for count in range(1, 10 * (n + m) + 1):
         active[n] = count
         _stationary(K, R, q, b, y, star)
@@ -323,6 +335,7 @@ def solve(
             side[active[out]] = 0
             _remove(K, R, q, out, active, b, multiplier)
             q -= 1
+            left = _look_again(side, left)
             continue
         for j in range(n):
             x[j] = 0.0
@@ -339,8 +352,9 @@ def solve(
                 if miss > worst:
                     worst, p, way = miss, k, towards
         if p < 0:
+            _look_again(side, left)
             return SOLVED
-        barred, newest, gained = -1, p, 0.0
+        barred, newest, gained, out = -1, p, 0.0, 0
         while True:
             _image(K, G, p, d)
             if _is_independent(d, q):
@@ -349,7 +363,6 @@ def solve(
             if out < 0:
                 if worst > FEASIBLE * size:
                     return INFEASIBLE
-                barred = p
                 break
             for i in range(q):
                 multiplier[i] -= way * step * r[i]
@@ -357,8 +370,12 @@ def solve(
             side[active[out]] = 0
             _remove(K, R, q, out, active, b, multiplier)
             q -= 1
-        if barred == p:
+            left = _look_again(side, left)
+        if out < 0:
+            side[p] = _LEFT
+            left += 1
             continue
+        left = _look_again(side, left)
         low, high = _bounds(lower, upper, G_lower, G_upper, p)
         _append(K, R, q, d, w)
         active[q], b[q], multiplier[q], side[p] = p, high if way > 0 else low, gained, way

@@ -4,6 +4,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy.optimize import nnls
 
 from surgsim.control.acceleration import TORQUE_SHARE, allows, fill_acceleration_bounds, prioritised
 from surgsim.control.seen import new_seen
@@ -192,3 +193,70 @@ def test_acceleration_bounds_hold(case, limits):
 )
 def test_contradictory_limits_are_an_outcome(case, limits, contradiction):
     assert _solved(case, limits, **contradiction)[1] == INFEASIBLE
+
+
+def _random_case(rng, demand):
+    """Inertia, load, rows and limits of an arm that does not exist; rest keeps the limits."""
+    A = rng.standard_normal((7, 7))
+    torque = rng.uniform(10.0, 200.0, 7)
+    return SimpleNamespace(
+        M=0.3 * A @ A.T / 7.0 + 0.05 * np.eye(7),
+        constant=0.5 * torque * rng.uniform(-1.0, 1.0, 7),
+        J=0.5 * rng.standard_normal((5, 7)),
+        a=demand * rng.standard_normal(5),
+        posture=demand * rng.standard_normal(7),
+        low=-rng.uniform(5.0, 100.0, 7),
+        high=rng.uniform(5.0, 100.0, 7),
+        torque_limit=torque,
+    )
+
+
+def _unmet(gradient, limits, rows):
+    """What active limits, with multipliers of the right sign, and rows leave of a level's gradient."""
+    A = np.vstack([limits, rows, -rows])
+    if not len(A):
+        return np.linalg.norm(gradient)
+    return nnls((A / np.linalg.norm(A, axis=1)[:, None]).T, gradient, maxiter=2000)[1]
+
+
+def _shortfall(c, x, demand):
+    """By how much RCM, tip and posture each miss their optimality conditions, relative to the demand."""
+    torque = c.M @ x + c.constant
+    rows, value = np.vstack([np.eye(7), c.M]), np.r_[x, torque]
+    low, high = np.r_[c.low, -c.torque_limit], np.r_[c.high, c.torque_limit]
+    near = 1e-5 * (1.0 + high)
+    limits = np.vstack([rows[value - low < near], -rows[high - value < near]])
+    tip, rcm = slice(0, 3), slice(3, 5)
+    levels = (
+        (c.J[rcm].T @ (c.J[rcm] @ x - c.a[rcm]), c.J[:0]),
+        (c.J[tip].T @ (c.J[tip] @ x - c.a[tip]), c.J[rcm]),
+        (c.M @ (x - c.posture), c.J),
+    )
+    return np.array([_unmet(gradient, limits, above) for gradient, above in levels]) / demand
+
+
+@pytest.mark.parametrize("demand", [10.0, 100.0, 1000.0])
+def test_no_level_is_ever_lost(demand):
+    """On 1,000 random problems: every level has an answer, and meets its conditions under those above it."""
+    rng, limited = np.random.default_rng(0), 0
+    for _ in range(1000):
+        c, x = _random_case(rng, demand), np.zeros(7)
+        assert prioritised(**vars(c), qddot=x) == GOES_ON
+        torque = np.abs(c.M @ x + c.constant)
+        assert max((x - c.high).max(), (c.low - x).max()) < 1e-6
+        assert (torque < c.torque_limit + 1e-6).all()
+        room = np.r_[c.torque_limit - torque, c.high - x, x - c.low]
+        limited += room.min() < 1e-3
+        assert (_shortfall(c, x, demand) < 2e-3).all()
+    assert limited > 200
+
+
+def test_a_lost_level_shows_in_its_conditions():
+    rng, lost = np.random.default_rng(1), 0
+    for _ in range(100):
+        c = _random_case(rng, 10.0)
+        without = SimpleNamespace(**{**vars(c), "posture": np.zeros(7)})
+        x = np.zeros(7)
+        prioritised(**vars(without), qddot=x)
+        lost += _shortfall(c, x, 10.0)[2] > 0.01
+    assert lost > 50
