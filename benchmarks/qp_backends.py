@@ -1,7 +1,8 @@
-"""The two shipped solvers of the QP resolvers, daqp and osqp, on every scenario in closed loop.
+"""Two solvers of the QP resolvers, daqp and osqp unless told otherwise, on every scenario in closed loop.
 
     python benchmarks/qp_backends.py                       every shipped scenario, whole
     python benchmarks/qp_backends.py circle_lwr4plus       some
+    python benchmarks/qp_backends.py --solvers active_set daqp
 
 A scenario that names a QP resolver runs with its own controller, every other one with `qp`. The table holds
 the largest difference between the two traces: what the same law makes of two solvers. Where the surroundings
@@ -29,8 +30,8 @@ def with_solver(name: str, solver: str) -> Scenario:
     return load_scenario(name, controller=None if own else "qp", assignments=setting)
 
 
-def row(name: str) -> list[str]:
-    scenarios = [with_solver(name, solver) for solver in ("daqp", "osqp")]
+def row(name: str, solvers: Sequence[str]) -> list[str]:
+    scenarios = [with_solver(name, solver) for solver in solvers]
     one, two = (simulate(scenario) for scenario in scenarios)
     ends = [f"{t.meta.ending.outcome.name.lower()} at {t.meta.ending.t_s:.3f} s" for t in (one, two)]
     apart = [f"{factor * difference(one, two, block):.1e}" for _, block, factor, _ in MEASURES]
@@ -50,13 +51,17 @@ def main(arguments: Sequence[str] | None = None) -> None:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("scenarios", nargs="*", metavar="SCENARIO", help="names; all shipped ones by default")
-    names = parser.parse_args(arguments).scenarios or list(shipped())
+    parser.add_argument("--solvers", nargs=2, default=("daqp", "osqp"), help="daqp osqp by default")
+    given = parser.parse_args(arguments)
+    names, solvers = given.scenarios or list(shipped()), given.solvers
     header = ["scenario", "resolver", "ends", *(f"{name} [{unit}]" for name, _, _, unit in MEASURES)]
     rows = []
     for name in names:
-        rows.append(row(name))
+        rows.append(row(name, solvers))
         print(" | ".join(rows[-1]), flush=True)
-    print_table("daqp against osqp", [*header, "controller [µs], daqp / osqp"], rows, range(3, 7), whole=True)
+    one, two = solvers
+    header.append(f"controller [µs], {one} / {two}")
+    print_table(f"{one} against {two}", header, rows, range(3, 7), whole=True)
 
 
 if __name__ == "__main__":
