@@ -262,29 +262,29 @@ class DynamicPlant:
         own = 3 * (self._scene.wall is not None) + 3 * self._touched + len(places)
         none = np.zeros(0)
         arrays = [(places.astype(float), none, own), (none, none, 0 if self._ledger is None else 10)]
-        hooks = [Hook(kind=VALUES, part=0, rank=0, function=_own_values)]
+        hooks = [Hook(kind=VALUES, part=0, rank=0, kernel=_own_values)]
         if self._ledger is not None:
             hooks += [
-                Hook(kind=BEFORE_STEP, part=1, rank=0, function=self._ledger.before_step),
-                Hook(kind=AFTER_STEP, part=1, rank=0, function=self._ledger.after_step),
-                Hook(kind=VALUES, part=1, rank=0, function=lambda: self._record(1, self._ledger_terms())),
+                Hook(kind=BEFORE_STEP, part=1, rank=0, call=self._ledger.before_step),
+                Hook(kind=AFTER_STEP, part=1, rank=0, call=self._ledger.after_step),
+                Hook(kind=VALUES, part=1, rank=0, call=lambda: self._record(1, self._ledger_terms())),
             ]
         for number, part in enumerate(self._parts, _FIRST_PART):
             width = sum(len(block.columns) for block in part.columns) if _records(part) else 0
             arrays.append((part.gains, part.memory, width))
             hooks += self._hooks_of(part, number)
-        return HookTable(hooks, arrays, len(self._scene.dof_ids))
+        return HookTable(hooks, arrays, len(self._scene.dof_ids), self.world)
 
     def _hooks_of(self, part: PlantPart, number: int) -> list[Hook]:
         found = []
         for kind, name in enumerate(KINDS):
-            kernel = part.kernels.get(name)
+            kernel, call = part.kernels.get(name), None
             if kernel is None and kind not in (BEFORE_STEP, AFTER_STEP) and overrides(part, name):
-                kernel = hook_call(
+                call = hook_call(
                     part, kind, self._scene, self._data, self.world, lambda n=number: self._own_slice(n)
                 )
-            if kernel is not None:
-                found.append(Hook(kind=kind, part=number, rank=part.rank, function=kernel))
+            if kernel is not None or call is not None:
+                found.append(Hook(kind=kind, part=number, rank=part.rank, kernel=kernel, call=call))
         return found
 
     def _ledger_terms(self) -> Array:

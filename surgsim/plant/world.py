@@ -6,9 +6,10 @@ from functools import cache
 from typing import Any, NamedTuple
 
 import mujoco
+import numba
 import numpy as np
 from numba import types
-from numba.core.dispatcher import Dispatcher
+from numba.extending import is_jitted
 from numpy.typing import NDArray
 
 from surgsim.compiled import as_parameter, compiled
@@ -102,13 +103,15 @@ class Hook:
         kind: Index in `KINDS`.
         part: Whose it is, an index.
         rank: Where it stands among those of its kind: lower first, then by part.
-        function: A compiled kernel, or what is to be called in Python.
+        kernel: A kernel, compiled or plain Python; None: `call` is called.
+        call: What is to be called in Python.
     """
 
     kind: int
     part: int
     rank: int
-    function: Any
+    kernel: Any = None
+    call: Callable[[], None] | None = None
 
 
 class HookTable:
@@ -118,6 +121,7 @@ class HookTable:
         hooks: The hooks.
         parts: What gives the parts' arrays: `gains`, `memory` and the width of its columns.
         joints: Number of the arm's joints.
+        world: The plant's record, for kernels that are plain Python.
 
     Attributes:
         functions: The kernels, one in each slot.
@@ -127,7 +131,9 @@ class HookTable:
         SurgsimError: If there are more hooks than slots.
     """
 
-    def __init__(self, hooks: Sequence[Hook], parts: Sequence[tuple[Array, Array, int]], joints: int) -> None:
+    def __init__(
+        self, hooks: Sequence[Hook], parts: Sequence[tuple[Array, Array, int]], joints: int, world: Any = None
+    ) -> None:
         if len(hooks) > SLOTS:
             raise SurgsimError(f"disturbances and props have {len(hooks)} hooks; at most {SLOTS} are allowed")
         ends = np.cumsum([[0, 0, 0]] + [[len(g), len(m), w] for g, m, w in parts], axis=0)
@@ -135,8 +141,8 @@ class HookTable:
         self._ends = ends
         order, counts = np.zeros((len(KINDS), SLOTS), dtype=np.int64), np.zeros(len(KINDS), dtype=np.int64)
         places = np.zeros((SLOTS, 6), dtype=np.int64)
-        entered = [PythonPart(h.function) for h in hooks if not isinstance(h.function, Dispatcher)]
-        self._entered = entered
+        entered = [PythonPart(self._call(slot, h)) for slot, h in enumerate(hooks) if _in_python(h)]
+        self._entered, self._world = entered, world
         addresses = np.concatenate([np.zeros(0), *(part.gains for part in entered)])
         self._memories = [m for _, m, _ in parts]
         self._gains = [g for g, _, _ in parts]
@@ -154,8 +160,8 @@ class HookTable:
         for slot, hook in enumerate(hooks):
             for k in range(3):
                 places[slot, 2 * k], places[slot, 2 * k + 1] = ends[hook.part, k], ends[hook.part + 1, k]
-            if isinstance(hook.function, Dispatcher):
-                functions.append(hook.function)
+            if not _in_python(hook):
+                functions.append(hook.kernel)
             else:
                 address = self._first_address + sum(f is python_kernel for f in functions)
                 places[slot, 0], places[slot, 1] = address, address + 1
@@ -166,6 +172,21 @@ class HookTable:
             order[kind, : len(slots)] = [slot for _, _, slot in slots]
         functions += [python_kernel] * (SLOTS - count)
         self.functions = tuple(as_parameter(function, hook_signature(joints)) for function in functions)
+
+    def _call(self, slot: int, hook: Hook) -> Callable[[], int | None]:
+        """What enters a hook in Python; a kernel in plain Python is given its part's slices."""
+        if hook.call is not None:
+            return hook.call
+
+        def call() -> int:
+            a, kernel = self.arrays, hook.kernel
+            first = self._ends[hook.part], self._ends[hook.part + 1]
+            gains, memory, values = (
+                array[first[0][k] : first[1][k]] for k, array in enumerate((a.gains, a.memory, a.values))
+            )
+            return int(kernel(gains, self._world, memory, values))
+
+        return call
 
     def fill(self) -> None:
         """Take over the parts' gains and memories, as they are after their start."""
@@ -186,6 +207,11 @@ class HookTable:
         """What a hook in Python raised."""
         errors = [part.raised() for part in self._entered]
         return next((error for error in errors if error is not None), None)
+
+
+def _in_python(hook: Hook) -> bool:
+    """Whether a hook is entered in Python: a method, or a kernel without its decorator."""
+    return hook.call is not None or not (is_jitted(hook.kernel) or numba.config.DISABLE_JIT)
 
 
 def overrides(part: PlantPart, hook: str) -> bool:

@@ -19,6 +19,7 @@ ANSWERS = """
 import sys
 import numpy as np
 from surgsim.contract import problems
+from surgsim.control.failure import ControlFailure
 from surgsim.control.port_estimators import PORT_ESTIMATORS
 from surgsim.control.resolvers import RESOLVERS
 from surgsim.control.torque_laws import TORQUE_LAWS
@@ -34,7 +35,12 @@ for catalog, make, call in (
             continue
         memory = None
         for seed in range(4):
-            found, memory = getattr(part, call)(make(seed), memory)
+            try:
+                found, memory = getattr(part, call)(make(seed), memory)
+            except ControlFailure as failure:
+                print(name, seed, failure.detail)
+                memory = None
+                continue
             values = found if call == "torque" else found.qdot
             print(name, seed, values.tobytes().hex(), memory.tobytes().hex())
 """
@@ -100,7 +106,7 @@ def test_threads_do_not_disturb_each_other(scenario):
 
 
 def test_every_shipped_law_but_the_python_ones_is_a_kernel(arm):
-    python = {"mink", "policy", "qp", "passive_qp", "self_motion"}
+    python = {"mink", "policy", "self_motion"}
     for catalog in (RESOLVERS, TORQUE_LAWS, PORT_ESTIMATORS):
         for name in set(catalog.names()) - python:
             assert hasattr(catalog.config(name)().build(arm), "kernel"), name
