@@ -37,7 +37,8 @@ def grip_at(gains: Array, t_s: float) -> float:
     """How closed the hand is, from 0 to 1: it closes and opens over `GRIP_S`."""
     closed = (t_s - gains[START]) / GRIP_S + 1.0
     opened = (gains[START] + gains[LENGTH] + gains[STAY] - t_s) / GRIP_S + 1.0
-    return min(max(min(closed, opened), 0.0), 1.0)
+    grip: float = min(max(min(closed, opened), 0.0), 1.0)
+    return grip
 
 
 @compiled
@@ -67,7 +68,7 @@ def guide(gains: Array, world: World, memory: Array, out: Array) -> int:
         memory[HOLDS] = 1.0
         memory[PLACE : PLACE + 3] = place
     moving, force = np.empty(6), np.empty(3)  # angular, then linear
-    mj_objectVelocity(world.model, world.data, _SITE, world.entry, moving.ctypes.data, 0)
+    mj_objectVelocity(world.mj_model, world.mj_data, _SITE, world.entry, moving.ctypes.data, 0)
     s, rate = _progress(gains, world.step_s)
     for i in range(3):
         gap = memory[PLACE + i] + s * gains[TRAVEL + i] + last[i] - place[i]
