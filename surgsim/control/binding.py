@@ -99,6 +99,7 @@ class Bound:
         parts: The parts.
         control: The record of the tick.
         minds: Their numbers and memories.
+        remembered: What the parts that are Python objects remember, by the value of `Control.who`.
     """
 
     kernels: tuple[Any, Any, Any]
@@ -106,6 +107,7 @@ class Bound:
     parts: ControllerParts
     control: Any
     minds: Minds
+    remembered: dict[int, Any]
 
     def failure(self, status: int) -> ControlFailure:
         """Why the last tick has no answer.
@@ -144,6 +146,7 @@ def _status_of(error: BaseException) -> int:
 def bind(parts: ControllerParts, control: Any, arm: ArmModel) -> Bound:
     """Join the parts to the record of a tick; those that are no compiled kernel are entered in Python."""
     entered: dict[int, PythonPart] = {}
+    remembered: dict[int, Any] = {}
     n = arm.limits.q_min.size
     minds = parts.minds(n)
 
@@ -158,47 +161,53 @@ def bind(parts: ControllerParts, control: Any, arm: ArmModel) -> Bound:
 
     return Bound(
         kernels=(
-            kernel(ESTIMATOR, parts.port, minds.port_gains, _port_call(parts.port, control, minds)),
-            kernel(SOLVER, parts.resolver, minds.resolver_gains, _resolver_call(parts, control, minds, arm)),
-            kernel(LAW, parts.law, minds.law_gains, _law_call(parts.law, control, minds)),
+            kernel(
+                ESTIMATOR, parts.port, minds.port_gains, _port_call(parts.port, control, minds, remembered)
+            ),
+            kernel(
+                SOLVER,
+                parts.resolver,
+                minds.resolver_gains,
+                _resolver_call(parts, control, minds, arm, remembered),
+            ),
+            kernel(LAW, parts.law, minds.law_gains, _law_call(parts.law, control, minds, remembered)),
         ),
         entered=entered,
         parts=parts,
         control=control,
         minds=minds,
+        remembered=remembered,
     )
 
 
-def _port_call(port: Any, c: Any, minds: Minds) -> Callable[[], int | None]:
+def _port_call(port: Any, c: Any, minds: Minds, remembered: dict[int, Any]) -> Callable[[], int | None]:
     if hasattr(port, "kernel"):
         return lambda: port.kernel(port.gains, c.seen, minds.port_memory, minds.port)
-    memory: Any = None
 
     def call() -> None:
-        nonlocal memory
         problem = port_problem_of(c.seen, has_dynamics=bool(c.has_law))
         if c.seen.first:
-            memory = port.start(problem)
+            remembered[ESTIMATOR] = port.start(problem)
         estimate: PortEstimate
-        estimate, memory = port.step(problem, memory)
+        estimate, remembered[ESTIMATOR] = port.step(problem, remembered[ESTIMATOR])
         minds.port[0], minds.port[1], minds.port[2] = estimate.p_WC, estimate.v_WC, estimate.a_WC
 
     return call
 
 
-def _resolver_call(parts: ControllerParts, c: Any, minds: Minds, arm: ArmModel) -> Callable[[], int | None]:
+def _resolver_call(
+    parts: ControllerParts, c: Any, minds: Minds, arm: ArmModel, remembered: dict[int, Any]
+) -> Callable[[], int | None]:
     resolver, seen = parts.resolver, c.referred if c.at_reference else c.seen
     if hasattr(resolver, "kernel"):
         return lambda: resolver.kernel(resolver.gains, seen, minds.resolver_memory, c.resolved)
-    memory: Any = None
 
     def call() -> None:
-        nonlocal memory
         problem = velocity_problem_of(seen, arm.limits)
         if seen.first:
-            memory = resolver.start(problem)
+            remembered[SOLVER] = resolver.start(problem)
         found: Resolution
-        found, memory = resolver.step(problem, memory)
+        found, remembered[SOLVER] = resolver.step(problem, remembered[SOLVER])
         out = c.resolved
         out.qdot[:], out.residual = found.qdot, found.residual
         out.values[: found.values.size] = found.values
@@ -209,18 +218,16 @@ def _resolver_call(parts: ControllerParts, c: Any, minds: Minds, arm: ArmModel) 
     return call
 
 
-def _law_call(law: Any, c: Any, minds: Minds) -> Callable[[], int | None]:
+def _law_call(law: Any, c: Any, minds: Minds, remembered: dict[int, Any]) -> Callable[[], int | None]:
     if hasattr(law, "kernel"):
         return lambda: law.kernel(law.gains, c.seen, minds.law_memory, minds.terms)
-    memory: Any = None
 
     def call() -> None:
-        nonlocal memory
         out = c.resolved
         resolution = Resolution(qdot=out.qdot.copy(), residual=float(out.residual), values=out.values.copy())
         problem = torque_problem_of(c.seen, resolution)
         if c.seen.first:
-            memory = law.start(problem)
-        minds.terms[:], memory = law.torque(problem, memory)
+            remembered[LAW] = law.start(problem)
+        minds.terms[:], remembered[LAW] = law.torque(problem, remembered[LAW])
 
     return call

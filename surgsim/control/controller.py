@@ -140,6 +140,19 @@ class Controller:
         port = (vector("trocar_estimate", "m"),) if self.estimates else ()
         return (*self.parts.columns, *port)
 
+    @property
+    def objects(self) -> dict[str, Any]:
+        """What of the controller is a Python object with a state, by name."""
+        parts = {"port": self._parts.port, "resolver": self._parts.resolver, "torque_law": self._parts.law}
+        named = {f"controller.{name}": part for name, part in parts.items()}
+        return {**named, "controller's memory": self._bound.remembered}
+
+    @property
+    def arrays(self) -> dict[str, Array]:
+        """The parts' numbers and memories, without addresses."""
+        entered = {("port_gains", "resolver_gains", "law_gains")[who] for who in self._bound.entered}
+        return {name: a for name, a in self.minds._asdict().items() if name not in entered}
+
     def reset(self) -> None:
         """Forget everything: the next tick is the first."""
         self.control.seen.first = 1

@@ -131,7 +131,7 @@ def fill_velocity_products(J: Array, z: Array, v: Array, linear: Array, angular:
 
 @compiled
 def manipulabilities(model: Model, q: Array) -> tuple[float, float]:
-    """Manipulability of the translational and the whole tip Jacobian at `q` (n,) [rad]; NaN for a `q` that is.
+    """Manipulability of the translational and the whole tip Jacobian at `q` (n,) [rad]; NaN if `q` is.
 
     Mu = sqrt(det(J J^T)), with J (3, n) and (6, n).
     """

@@ -233,6 +233,17 @@ class DynamicPlant:
         self._contacts = ContactWatch(scene, self._data)
 
     @property
+    def data(self) -> mujoco.MjData:
+        """MuJoCo's data; the plant alone writes them."""
+        return self._data
+
+    @property
+    def objects(self) -> dict[str, Any]:
+        """What of the plant is a Python object with a state, by name."""
+        parts = {f"{type(part).__name__} ({k})": part for k, part in enumerate(self._parts)}
+        return {**parts, "energy ledger": self._ledger}
+
+    @property
     def parts(self) -> tuple[PlantPart, ...]:
         """Disturbances and props, in the scenario's order."""
         return self._parts

@@ -85,6 +85,16 @@ class KinematicPlant:
         self._points = PointReader(scene, self._data)
         self.watch = ContactWatch(scene, self._data)
 
+    @property
+    def data(self) -> mujoco.MjData:
+        """MuJoCo's data; the plant alone writes them."""
+        return self._data
+
+    @property
+    def objects(self) -> dict[str, Any]:
+        """What of the plant is a Python object with a state: nothing."""
+        return {}
+
     def reset(self, q: Array) -> State:
         """Put the arm at rest at joint positions `q` (n,) [rad]."""
         mujoco.mj_resetData(self._scene.model, self._data)

@@ -195,6 +195,16 @@ class HookTable:
             self.arrays.memory[:] = np.concatenate([np.zeros(0), *self._memories])
         self.arrays.gains[self._first_address :] = self._addresses
 
+    @property
+    def state(self) -> dict[str, Array]:
+        """The parts' numbers, memories and columns, without addresses."""
+        a = self.arrays
+        return {
+            "hook_gains": a.gains[: self._first_address],
+            "hook_memory": a.memory,
+            "hook_values": a.values,
+        }
+
     def values_of(self, part: int) -> Array:
         """The columns of a part, a view of the plant's values."""
         return self.arrays.values[self._ends[part, 2] : self._ends[part + 1, 2]]

@@ -2,21 +2,26 @@
 
 import math
 from collections.abc import Callable
+from copy import copy
 from typing import Any
 
+import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
 from surgsim.columns import joints, width
 from surgsim.compiled import as_parameter
-from surgsim.errors import Outcome
+from surgsim.errors import Outcome, SurgsimError
+from surgsim.plant.bore import Bore
 from surgsim.plant.state import State
 from surgsim.plant.world import BLOCK_TICKS
 from surgsim.scenario.schema import Scenario, StopConfig
+from surgsim.simulate.objects import put_back, store
 from surgsim.simulate.rows import Rows
-from surgsim.simulate.safety import SafetyMonitor, is_safe
+from surgsim.simulate.safety import Guard, SafetyMonitor, is_safe
 from surgsim.simulate.setup import Setup, prepare
-from surgsim.simulate.stop import new_stop
+from surgsim.simulate.snapshot import Snapshot, content_of, fill
+from surgsim.simulate.stop import Stop, new_stop
 from surgsim.simulate.ticks import (
     DONE,
     FAILED,
@@ -38,7 +43,7 @@ from surgsim.simulate.ticks import (
 from surgsim.tasks.base import TipCommand
 from surgsim.tasks.binding import BoundTask
 from surgsim.tasks.command import command_of
-from surgsim.tick.arrays import new
+from surgsim.tick.arrays import Control, Record, World, new
 from surgsim.tick.status import GOES_ON
 from surgsim.trace.trace import BASE_BLOCKS, Ending, Trace, TraceMeta
 
@@ -234,6 +239,84 @@ class Simulation:
         c, world = self._setup.controller.control, self._setup.plant.world
         if self._ask_task(self._run, self._tables, c, world, self._task.kernel) != GOES_ON:
             self._end(TASK_TOLD)
+
+    def snapshot(self) -> Snapshot:
+        """All that the run is now.
+
+        Raises:
+            SurgsimError: If a part that is a Python object has a state that cannot be copied.
+        """
+        return Snapshot(
+            scenario=self._setup.scenario.model_dump_json(),
+            t_s=self.time_s,
+            records={name: content_of(record) for name, (record, _) in self._records().items()},
+            arrays={name: array.copy() for name, array in self._arrays().items()},
+            rows=self._rows.data[: int(self._run.progress.rows)].copy(),
+            data=copy(self._setup.plant.data),
+            objects=store(self._objects(), self._shared()),
+            ending=self._ending,
+        )
+
+    def restore(self, snapshot: Snapshot) -> None:
+        """Be at the tick of `snapshot`: what follows has the same bits as what followed it.
+
+        Raises:
+            SurgsimError: If it is of another scenario.
+        """
+        if snapshot.scenario != self._setup.scenario.model_dump_json():
+            raise SurgsimError(f"{self._setup.scenario.name}: the snapshot is of another scenario")
+        for name, (record, kind) in self._records().items():
+            fill(record, kind, snapshot.records[name])
+        for name, array in self._arrays().items():
+            array[...] = snapshot.arrays[name]
+        rows = self._rows.data
+        rows[: len(snapshot.rows)], rows[len(snapshot.rows) :] = snapshot.rows, math.nan
+        mujoco.mj_copyData(self._setup.plant.data, self._setup.scene.model, snapshot.data)
+        put_back(self._objects(), snapshot.objects, self._shared())
+        self._ending = snapshot.ending
+
+    def fork(self) -> "Simulation":
+        """Another simulation at the same tick, which goes on by itself.
+
+        Raises:
+            SurgsimError: If a part that is a Python object has a state that cannot be copied.
+        """
+        other = Simulation(prepare(self._setup.scenario))
+        other.restore(self.snapshot())
+        return other
+
+    def _records(self) -> dict[str, tuple[Any, type[Record]]]:
+        plant, control = self._setup.plant, self._setup.controller.control
+        return {
+            "run": (self._run, Run),
+            "control": (control, Control),
+            "world": (plant.world, World),
+            "bore": (plant.bore, Bore),
+            "guard": (self._safety.guard, Guard),
+            "stop": (self._stop, Stop),
+        }
+
+    def _arrays(self) -> dict[str, Array]:
+        setup = self._setup
+        return {**self._task.arrays, **setup.controller.arrays, **setup.plant.hooks.state}
+
+    def _objects(self) -> dict[str, Any]:
+        setup = self._setup
+        return {"task": setup.task, **setup.controller.objects, **setup.plant.objects}
+
+    def _shared(self) -> dict[str, Any]:
+        """What belongs to this simulation, and stands by its name in a snapshot."""
+        setup = self._setup
+        records = {name: record for name, (record, _) in self._records().items()}
+        return {
+            **records,
+            "scene": setup.scene,
+            "model": setup.scene.model,
+            "data": setup.plant.data,
+            "arm": setup.arm,
+            "arm's scene": setup.arm.scene,
+            "arm's model": setup.arm.scene.model,
+        }
 
     def trace(self) -> Trace:
         """The trace so far, with its derived columns."""

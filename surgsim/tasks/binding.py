@@ -42,6 +42,12 @@ class BoundTask:
             self._entered = PythonPart(self._call)
             self.kernel, self.gains = as_parameter(python_kernel, task_signature()), self._entered.gains
 
+    @property
+    def arrays(self) -> dict[str, Array]:
+        """Its numbers and memory, without addresses."""
+        own = {"task_memory": self.memory}
+        return own if self._entered is not None else {**own, "task_gains": self.gains}
+
     def raised(self) -> BaseException | None:
         """What a task in Python raised."""
         return None if self._entered is None else self._entered.raised()

@@ -31,10 +31,12 @@ MOST_VALUES = 64
 class Record:
     """Base of the records: fields in order, numbers as they are, arrays with their shape in `SHAPES`.
 
-    A shape is a text of whole numbers and `n`, the number of joints, e.g. `3 n`.
+    A shape is a text of whole numbers and `n`, the number of joints, e.g. `3 n`. `ADDRESSES` names the fields
+    that hold one: they mean something in their own simulation alone, and no snapshot has them.
     """
 
     SHAPES: ClassVar[dict[str, str]] = {}
+    ADDRESSES: ClassVar[frozenset[str]] = frozenset()
 
 
 @cache
@@ -102,6 +104,9 @@ class Model(Record):
         "bias": "n",
         "damping": "n",
     }
+    ADDRESSES: ClassVar[frozenset[str]] = frozenset(
+        ("mj_model", "mj_data", "qpos", "qvel", "site_xpos", "site_xmat", "xaxis", "xanchor")
+    )
     mj_model: int
     mj_data: int
     qpos: int
@@ -442,6 +447,29 @@ class World(Record):
         **{name: "3" for name in ("p_WT", "p_WR", "p_WC", "f_C", "f_T", "p_WC_m", "v_WC_m", "f_T_m")},
         **{name: "3" for name in ("port_home", "port_offset", "port_velocity")},
     }
+    ADDRESSES: ClassVar[frozenset[str]] = frozenset(
+        (
+            "mj_model",
+            "mj_data",
+            "xaxis",
+            "xanchor",
+            "qpos",
+            "qvel",
+            "ctrl",
+            "qfrc_bias",
+            "qfrc_applied",
+            "xfrc_applied",
+            "xpos",
+            "xquat",
+            "xmat",
+            "xipos",
+            "site_xpos",
+            "site_xmat",
+            "cfrc_ext",
+            "mocap_pos",
+            "sensordata",
+        )
+    )
     mj_model: int
     mj_data: int
     xaxis: int

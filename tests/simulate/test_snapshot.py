@@ -1,0 +1,128 @@
+"""A run that is stored, restored or forked goes on with the same bits."""
+
+import pickle
+
+import numpy as np
+import pytest
+
+from surgsim.control.policies.registry import offering
+from surgsim.errors import SurgsimError
+from surgsim.scenario.load import load_scenario
+from surgsim.simulate.loop import Simulation
+from surgsim.simulate.setup import prepare
+
+SHORT = ("task.duration_s=1", "task.ramp_s=0.2", "task.hold_start_s=0.1", "task.hold_end_s=0.1")
+NOISE = ("disturbances=[{type: sensor_noise}, {type: payload, spread: 0.5}]",)
+CONTROLLERS = ("pinv", "gradient", "rnn", "vprnn", "rcm_inverse_dynamics", "mink")
+
+
+def _begun(scenario, ticks):
+    simulation = Simulation(prepare(scenario))
+    for _ in range(ticks):
+        simulation.tick()
+    return simulation
+
+
+def _rest(simulation, ticks):
+    """The rows that follow, but for the time that the controller took."""
+    for _ in range(ticks):
+        simulation.tick()
+    trace = simulation.trace()
+    kept = [k for k, name in enumerate(trace.columns) if name != "control_time_s"]
+    return trace.data[:, kept]
+
+
+def _same(a, b):
+    np.testing.assert_array_equal(a, b)
+
+
+@pytest.mark.parametrize("ticks", [0, 1, 137])
+@pytest.mark.parametrize("controller", CONTROLLERS)
+def test_a_circle_goes_on_with_the_same_bits(controller, ticks):
+    simulation = _begun(load_scenario("circle_panda", controller=controller, assignments=SHORT), ticks)
+    taken = pickle.loads(pickle.dumps(simulation.snapshot()))
+    fork = simulation.fork()
+    expected = _rest(simulation, 60)
+    _same(_rest(fork, 60), expected)
+    simulation.restore(taken)
+    assert simulation.time_s == taken.t_s
+    _same(_rest(simulation, 60), expected)
+
+
+@pytest.mark.parametrize(
+    ("name", "ticks"), [("theatre_panda", 200), ("peg_and_ring_panda", 150), ("teleop_wall_panda", 150)]
+)
+def test_everything_at_once_goes_on_with_the_same_bits(name, ticks):
+    simulation = _begun(load_scenario(name, controller="pinv"), ticks)
+    fork, taken = simulation.fork(), simulation.snapshot()
+    expected = _rest(simulation, 100)
+    _same(_rest(fork, 100), expected)
+    simulation.restore(taken)
+    _same(_rest(simulation, 100), expected)
+
+
+def test_a_fork_goes_its_own_way_and_leaves_the_first_alone():
+    scenario = load_scenario("circle_panda", controller="pinv", assignments=SHORT)
+    undisturbed, simulation = _begun(scenario, 50), _begun(scenario, 50)
+    fork = simulation.fork()
+    fork._setup.plant.data.qvel[:] += 0.01
+    assert not np.array_equal(_rest(fork, 50), _rest(undisturbed, 50))
+    _same(_rest(simulation, 50), _rest(undisturbed, 0))
+
+
+class Counting:
+    """A policy with a memory: it turns round every tenth time that it is asked."""
+
+    def __init__(self):
+        self.asked, self.random, self.lately = 0, np.random.default_rng(1), []
+
+    def __call__(self, observation):
+        self.asked += 1
+        self.lately = [*self.lately[-3:], self.random.normal(size=3)]
+        return 1e-3 * (-1.0) ** (self.asked // 10) * sum(self.lately)
+
+
+POLICY = {
+    "name": "asked",
+    "resolver": {"type": "policy", "name": "counting"},
+    "torque_law": {"type": "joint_impedance"},
+}
+
+
+def test_a_policy_in_python_goes_on_where_it_was(tmp_path):
+    from surgsim.control.controller import ControllerConfig
+
+    with offering("counting", policy := Counting()):
+        scenario = load_scenario(
+            "circle_panda", controller=ControllerConfig.model_validate(POLICY), assignments=SHORT
+        )
+        simulation = _begun(scenario, 33)
+        taken = simulation.snapshot()
+        expected = _rest(simulation, 50)
+        assert policy.asked == 83
+        simulation.restore(taken)
+        assert policy.asked == 33
+        _same(_rest(simulation, 50), expected)
+
+
+def test_a_part_that_cannot_be_copied_is_named():
+    with offering("counting", policy := Counting()):
+        from surgsim.control.controller import ControllerConfig
+
+        scenario = load_scenario(
+            "circle_panda", controller=ControllerConfig.model_validate(POLICY), assignments=SHORT
+        )
+        simulation = _begun(scenario, 1)
+        policy.stream = (k for k in range(9))
+        with pytest.raises(
+            SurgsimError,
+            match=r"^controller\.resolver: a run with it cannot be stored, its state cannot be copied: ",
+        ):
+            simulation.snapshot()
+
+
+def test_a_snapshot_of_another_scenario_is_refused():
+    one = _begun(load_scenario("circle_panda", controller="pinv", assignments=SHORT), 1)
+    other = _begun(load_scenario("circle_panda", controller="qp", assignments=SHORT), 1)
+    with pytest.raises(SurgsimError, match=r"^circle_panda: the snapshot is of another scenario$"):
+        other.restore(one.snapshot())
