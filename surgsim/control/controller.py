@@ -143,8 +143,8 @@ class Controller:
     @property
     def objects(self) -> dict[str, Any]:
         """What of the controller is a Python object with a state, by name."""
-        parts = {"port": self._parts.port, "resolver": self._parts.resolver, "torque_law": self._parts.law}
-        named = {f"controller.{name}": part for name, part in parts.items()}
+        parts = {"port": self.parts.port, "resolver": self.parts.resolver, "torque_law": self.parts.law}
+        named = {f"controller.{name}": part for name, part in parts.items() if not hasattr(part, "kernel")}
         return {**named, "controller's memory": self._bound.remembered}
 
     @property

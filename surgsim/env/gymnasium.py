@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from surgsim.catalog import PartConfig
 from surgsim.env.actions import Action
-from surgsim.env.environment import DECIMATION, load
+from surgsim.env.environment import DECIMATION, EnvironmentState, load
 from surgsim.scenario.load import load_scenario, shipped
 from surgsim.scenario.schema import Scenario
 
@@ -85,6 +85,20 @@ class SurgsimEnv(gymnasium.Env[Observation, Any]):
         over = now.last()
         lost = over and now.discount == 0.0
         return dict(now.observation), float(now.reward), lost, over and not lost, self._info()
+
+    def get_state(self) -> EnvironmentState:
+        """All that the environment is now, for `set_state`; see `surgsim.env.environment.Environment`."""
+        return self.environment.get_state()
+
+    def set_state(self, state: EnvironmentState) -> tuple[Observation, dict[str, Any]]:
+        """Go on from `state`; the observation there, and its info.
+
+        Raises:
+            SurgsimError: If it is of another scenario.
+        """
+        self.environment.set_state(state)
+        task, physics = self.environment.task, self.environment.physics
+        return dict(task.get_observation(physics)), self._info()
 
     def _info(self) -> dict[str, Any]:
         task = self.environment.task

@@ -1,5 +1,7 @@
 """surgsim's simulation as a `dm_control` physics."""
 
+from dataclasses import dataclass
+
 import numpy as np
 from dm_control.rl import control
 from numpy.typing import ArrayLike, NDArray
@@ -12,10 +14,19 @@ from surgsim.plant.state import State
 from surgsim.scenario.schema import Scenario
 from surgsim.simulate.loop import Simulation
 from surgsim.simulate.setup import Setup, prepare
+from surgsim.simulate.snapshot import Snapshot
 from surgsim.tasks.base import TipCommand
 from surgsim.trace.trace import Ending, Trace
 
 Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True)
+class EpisodeState:
+    """An episode at a tick: its scenario, seed included, and the run."""
+
+    scenario: Scenario
+    snapshot: Snapshot
 
 
 class SurgsimPhysics(control.Physics):
@@ -70,6 +81,27 @@ class SurgsimPhysics(control.Physics):
         if not self._simulation.ended:
             raise SurgsimError("the episode has not ended: it has no trace yet")
         return self._simulation.trace()
+
+    def get_state(self) -> EpisodeState:
+        """All that the episode is now.
+
+        Raises:
+            SurgsimError: If a part that is a Python object has a state that cannot be copied.
+        """
+        return EpisodeState(scenario=self._scenario, snapshot=self._simulation.snapshot())
+
+    def set_state(self, state: EpisodeState) -> None:
+        """Go on from `state`, of this episode or another one; what follows has the same bits as it had.
+
+        Raises:
+            SurgsimError: If it is of another scenario.
+        """
+        if state.scenario != self._scenario:
+            if state.scenario != self._scenario.model_copy(update={"seed": state.scenario.seed}):
+                raise SurgsimError(f"{self._scenario.name}: the state is of another scenario")
+            self._scenario = state.scenario
+            self.after_reset()
+        self._simulation.restore(state.snapshot)
 
     def set_seed(self, seed: int) -> None:
         """Seed of the episode that is about to begin."""

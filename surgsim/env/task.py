@@ -1,5 +1,6 @@
 """What an agent is asked to do, as a `dm_control` task."""
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -59,6 +60,15 @@ class ScenarioTask(control.Task):
     def reseed(self, seed: int) -> None:
         """Begin the sequence of episodes that belongs to `seed`."""
         self._random = np.random.default_rng(np.random.SeedSequence(seed))
+
+    @property
+    def random_state(self) -> Mapping[str, Any]:
+        """Where in the sequence of the episodes' seeds it is."""
+        return self._random.bit_generator.state
+
+    @random_state.setter
+    def random_state(self, state: Mapping[str, Any]) -> None:
+        self._random.bit_generator.state = state
 
     def initialize_episode(self, physics: SurgsimPhysics) -> None:
         """Draw the episode's seed."""

@@ -155,6 +155,7 @@ class HookTable:
             values=np.zeros(int(ends[-1, 2])),
         )
         self._first_address = int(ends[-1, 0])
+        self._own_gains = self.arrays.gains[: self._first_address]
         self._addresses = addresses
         functions: list[Any] = []
         for slot, hook in enumerate(hooks):

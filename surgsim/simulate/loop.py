@@ -308,8 +308,13 @@ class Simulation:
         """What belongs to this simulation, and stands by its name in a snapshot."""
         setup = self._setup
         records = {name: record for name, (record, _) in self._records().items()}
+        memory = {f"{name}'s memory": record.base for name, record in records.items()}
         return {
             **records,
+            **memory,
+            **self._arrays(),
+            "plant": setup.plant,
+            "controller": setup.controller,
             "scene": setup.scene,
             "model": setup.scene.model,
             "data": setup.plant.data,

@@ -2,7 +2,8 @@
 
 Objects are pickled. What belongs to the run itself (its models, its records) and what does not change (its
 functions or classes) is not copied but named, and found again where the state is put back: no address of the
-one run gets into the other. Arrays are written in place, since compiled code works on their memory.
+one run gets into the other. Objects stay the ones that they are; arrays and containers in them are replaced,
+unless the memory is shared or MuJoCo's.
 """
 
 import io
@@ -58,7 +59,14 @@ def store(objects: Mapping[str, Any], shared: Mapping[str, Any]) -> Stored:
 def put_back(objects: Mapping[str, Any], stored: Stored, shared: Mapping[str, Any]) -> None:
     """Give `objects` the state that is `stored`."""
     found = _Unpickler(io.BytesIO(stored.content), stored.constants, shared).load()
-    _Return(shared).into(dict(objects), found)
+    walk = _Return(shared)
+    for name, now in objects.items():
+        if isinstance(now, dict):
+            content = {key: walk.into(now.get(key), value) for key, value in found[name].items()}
+            now.clear()
+            now.update(content)
+        else:
+            walk.into(now, found[name])
 
 
 def _stored(objects: Any, shared: Mapping[str, Any]) -> Stored:
@@ -70,7 +78,7 @@ def _stored(objects: Any, shared: Mapping[str, Any]) -> Stored:
 
 class _Pickler(pickle.Pickler):
     def __init__(self, file: io.BytesIO, shared: Mapping[str, Any]) -> None:
-        super().__init__(file, protocol=5)
+        super().__init__(file, protocol=4)
         self._shared = {id(value): name for name, value in shared.items()}
         self._places: dict[int, int] = {}
         self.constants: list[Any] = []
@@ -132,63 +140,68 @@ class _Return:
         if now is stored or id(stored) in self._shared:
             return stored
         fits = type(now) is type(stored) and id(now) not in self._taken and id(now) not in self._shared
+        same = now if fits else None
         if isinstance(stored, MethodType):
             return MethodType(stored.__func__, self._done.get(id(stored.__self__), stored.__self__))
         if isinstance(stored, _CONSTANT):
             return now if _same_code(now, stored) else stored
         if isinstance(stored, np.ndarray):
-            return self._array(now if fits else None, stored)
+            return self._array(same, stored)
         if isinstance(stored, mujoco.MjData) and fits:
             mujoco.mj_copyData(now, now.model, stored)
             return self._keep(now, stored)
-        if isinstance(stored, dict | list):
-            return self._container(now if fits else None, stored)
-        if isinstance(stored, tuple) and type(stored) is tuple:
-            same = now if fits and len(now) == len(stored) else (None,) * len(stored)
-            return tuple(self.into(a, b) for a, b in zip(same, stored, strict=True))
-        if not hasattr(stored, "__dict__"):
-            return stored
-        return self._object(now if fits else None, stored)
+        if isinstance(stored, dict):
+            return self._dict(same, stored)
+        if type(stored) in (list, tuple):
+            return self._sequence(same, stored)
+        return self._object(same, stored) if hasattr(stored, "__dict__") else stored
 
     def _keep(self, now: Any, stored: Any) -> Any:
         self._done[id(stored)] = self._taken[id(now)] = now
         return now
 
     def _array(self, now: Any, stored: NDArray[Any]) -> Any:
-        if isinstance(stored.base, np.ndarray) and stored.base.flags.c_contiguous:
-            whole = self.into(now.base if now is not None else None, stored.base)
-            return _view(whole, _offset(stored), stored.shape, stored.strides, stored.dtype)
-        if now is None or now.shape != stored.shape or now.dtype != stored.dtype or stored.dtype.hasobject:
+        if now is not None and _is_foreign(now) and now.shape == stored.shape:
+            return now
+        if not isinstance(stored.base, np.ndarray):
             return stored
-        foreign = now.base is not None and not isinstance(now.base, np.ndarray)
-        if foreign and now.flags.writeable:
-            return self._keep(now, stored)  # memory of MuJoCo's, which has a state of its own
-        if not now.flags.writeable:
-            return now if np.array_equal(now, stored) else stored
-        now[...] = stored
-        return self._keep(now, stored)
+        whole = self.into(None, stored.base)
+        if whole is stored.base:
+            return stored
+        return _view(whole, _offset(stored), stored.shape, stored.strides, stored.dtype)
 
-    def _container(self, now: Any, stored: Any) -> Any:
-        out = self._keep(stored if now is None else now, stored)
-        if isinstance(stored, dict):
-            old = {} if now is None else dict(now)
-            items = {key: self.into(old.get(key), value) for key, value in stored.items()}
-            out.clear()
-            out.update(items)
-        else:
-            pairs = list(now) if now is not None and len(now) == len(stored) else [None] * len(stored)
-            out[:] = [self.into(a, b) for a, b in zip(pairs, list(stored), strict=True)]
-        return out
+    def _dict(self, now: Any, stored: dict[Any, Any]) -> dict[Any, Any]:
+        out = self._keep(stored, stored)
+        old = {} if now is None else dict(now)
+        for key, value in list(stored.items()):
+            out[key] = self.into(old.get(key), value)
+        return stored
+
+    def _sequence(self, now: Any, stored: Any) -> Any:
+        pairs = now if now is not None and len(now) == len(stored) else (None,) * len(stored)
+        if isinstance(stored, tuple):
+            return tuple(self.into(a, b) for a, b in zip(pairs, stored, strict=True))
+        self._keep(stored, stored)
+        stored[:] = [self.into(a, b) for a, b in zip(pairs, list(stored), strict=True)]
+        return stored
 
     def _object(self, now: Any, stored: Any) -> Any:
         frozen = is_dataclass(stored) and type(stored).__dataclass_params__.frozen  # type: ignore[attr-defined]
         out = stored if now is None or frozen else now
-        self._done[id(stored)] = self._taken[id(out)] = out
+        self._keep(out, stored)
         old = {} if now is None else dict(vars(now))
         fields = {name: self.into(old.get(name), value) for name, value in list(vars(stored).items())}
         vars(out).clear()
         vars(out).update(fields)
         return out
+
+
+def _is_foreign(given: NDArray[Any]) -> bool:
+    """Whether an array's memory is not Python's and is writable: MuJoCo's, which has a state of its own."""
+    whole = given
+    while isinstance(whole.base, np.ndarray):
+        whole = whole.base
+    return whole.base is not None and whole.flags.writeable and not isinstance(whole.base, bytes | bytearray)
 
 
 def _same_code(now: Any, stored: Any) -> bool:

@@ -321,3 +321,31 @@ def test_rewards_fall_with_either_error():
         > reward(1.0, 1.0)
         > 0
     )
+
+
+@every_action
+def test_an_episode_goes_on_from_a_state_with_the_same_bits(brief_scenario, action):
+    first = load(brief_scenario("circle_lwr4plus"), action=action, seed=3)
+    first.reset()
+    first.step(0.1 * first.action_spec().maximum)
+    state = first.get_state()
+
+    def onward(environment):
+        policy = random_policy(environment, 1, 0.1)
+        steps = [environment.step(policy(None)) for _ in range(3)]
+        return [*steps, *episode(environment, random_policy(environment, 2, 0.1))]
+
+    expected = onward(first)
+    other = load(brief_scenario("circle_lwr4plus"), action=action, seed=4)
+    other.reset()
+    for environment in (first, other):  # it has ended; or it is at the begin of another episode
+        environment.set_state(state)
+        assert same(onward(environment), expected)
+
+
+def test_a_state_of_another_scenario_is_refused(table, brief_scenario):
+    other = load(brief_scenario("circle_panda"))
+    for environment in (table, other):
+        environment.reset()
+    with pytest.raises(SurgsimError, match=r"^circle_panda: the state is of another scenario$"):
+        other.set_state(table.get_state())

@@ -13,7 +13,7 @@ from surgsim.simulate.setup import prepare
 
 SHORT = ("task.duration_s=1", "task.ramp_s=0.2", "task.hold_start_s=0.1", "task.hold_end_s=0.1")
 NOISE = ("disturbances=[{type: sensor_noise}, {type: payload, spread: 0.5}]",)
-CONTROLLERS = ("pinv", "gradient", "rnn", "vprnn", "rcm_inverse_dynamics", "mink")
+CONTROLLERS = ("pinv", "gradient", "rnn", "vprnn", "qp", "passive_convex", "rcm_inverse_dynamics", "mink")
 
 
 def _begun(scenario, ticks):
@@ -53,7 +53,7 @@ def test_a_circle_goes_on_with_the_same_bits(controller, ticks):
     ("name", "ticks"), [("theatre_panda", 200), ("peg_and_ring_panda", 150), ("teleop_wall_panda", 150)]
 )
 def test_everything_at_once_goes_on_with_the_same_bits(name, ticks):
-    simulation = _begun(load_scenario(name, controller="pinv"), ticks)
+    simulation = _begun(load_scenario(name), ticks)
     fork, taken = simulation.fork(), simulation.snapshot()
     expected = _rest(simulation, 100)
     _same(_rest(fork, 100), expected)
