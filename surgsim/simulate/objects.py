@@ -9,7 +9,7 @@ unless the memory is shared or MuJoCo's.
 import io
 import pickle
 from collections.abc import Mapping
-from dataclasses import dataclass, is_dataclass
+from dataclasses import dataclass
 from types import FunctionType, MethodType, ModuleType
 from typing import Any
 
@@ -186,7 +186,8 @@ class _Return:
         return stored
 
     def _object(self, now: Any, stored: Any) -> Any:
-        frozen = is_dataclass(stored) and type(stored).__dataclass_params__.frozen  # type: ignore[attr-defined]
+        parameters: Any = getattr(type(stored), "__dataclass_params__", None)
+        frozen = parameters is not None and parameters.frozen
         out = stored if now is None or frozen else now
         self._keep(out, stored)
         old = {} if now is None else dict(vars(now))

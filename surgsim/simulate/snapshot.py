@@ -6,7 +6,6 @@ Nominal models are functions of the joints and have no state.
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import cache
 from typing import Any, get_type_hints
 
 import mujoco
@@ -53,10 +52,10 @@ def content_of(record: Any) -> bytes:
 
 def fill(record: Any, kind: type[Record], content: bytes) -> None:
     """Give a record the content of another one of its kind, but for the addresses in it."""
-    own, kept = _bytes_of(record), _addresses(record.dtype, kind)
+    own = _bytes_of(record)
     given = np.frombuffer(content, dtype=np.uint8).copy()
-    for at in kept:
-        given[at] = own[at]
+    for at in _walk(record.dtype, kind, 0):
+        given[at : at + 8] = own[at : at + 8]
     own[:] = given
 
 
@@ -65,13 +64,8 @@ def _bytes_of(record: Any) -> Bytes:
     return np.asarray(record.base).view(np.uint8)
 
 
-@cache
-def _addresses(layout: np.dtype[Any], kind: type[Record]) -> tuple[slice, ...]:
-    """Where in a record's bytes addresses are."""
-    return tuple(slice(at, at + 8) for at in _walk(layout, kind, 0))
-
-
 def _walk(layout: np.dtype[Any], kind: type[Record], at: int) -> Iterator[int]:
+    """Where in a record's bytes addresses are."""
     assert layout.fields is not None
     for name, (field, offset, *_) in layout.fields.items():
         if name in kind.ADDRESSES:

@@ -1,6 +1,7 @@
 """A run that is stored, restored or forked goes on with the same bits."""
 
 import pickle
+from typing import get_type_hints
 
 import numpy as np
 import pytest
@@ -126,3 +127,20 @@ def test_a_snapshot_of_another_scenario_is_refused():
     other = _begun(load_scenario("circle_panda", controller="qp", assignments=SHORT), 1)
     with pytest.raises(SurgsimError, match=r"^circle_panda: the snapshot is of another scenario$"):
         other.restore(one.snapshot())
+
+
+def test_every_address_in_a_record_is_known_as_one():
+    simulation = _begun(load_scenario("theatre_panda"), 1)
+
+    def addresses(record, kind):
+        for name in record.dtype.names:
+            value = record[name]
+            if name in kind.ADDRESSES:
+                assert value == 0 or value > 2**20
+            elif isinstance(value, np.int64):
+                assert abs(value) < 2**20, f"{kind.__name__}.{name}"
+            elif isinstance(value, np.void):
+                addresses(value, get_type_hints(kind)[name])
+
+    for record, kind in simulation._records().values():
+        addresses(record, kind)
