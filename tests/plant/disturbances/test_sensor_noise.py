@@ -6,6 +6,7 @@ from scipy.signal import lfilter
 
 from surgsim.errors import ScenarioError
 from surgsim.plant.disturbances.sensor_noise import SensorNoiseConfig
+from surgsim.plant.world import BLOCK_TICKS
 
 QUIET = dict(
     position_std_rad=0.0, velocity_std_rad_per_s=0.0, torque_std_nm=0.0, port_std_m=0.0, tip_force_std_n=0.0
@@ -52,6 +53,13 @@ def test_noise_repeats_from_the_seed_and_after_a_reset(disturbed):
     for name in ("q", "v", "tau", "p_WC", "f_T"):
         np.testing.assert_array_equal(_stack(first, name), _stack(again, name))
         assert (_stack(first, name) != _stack(other, name)).all()
+
+
+def test_noise_is_one_sequence_of_the_generator_whatever_the_blocks(disturbed):
+    states = [disturbed.state_at(k, q=np.zeros(7)) for k in range(2 * BLOCK_TICKS + 10)]
+    measured = _stack(_measured(disturbed, SensorNoiseConfig(position_std_rad=1e-3), states), "q")
+    drawn = np.random.default_rng([0, 1]).standard_normal((len(states), 27))[:, :7]
+    np.testing.assert_array_equal(measured, 1e-3 * drawn)
 
 
 @pytest.mark.parametrize("bits", [12, 20])
