@@ -8,7 +8,17 @@ from numba import types
 from surgsim.compiled import compiled
 from surgsim.control.bounds import fill_velocity_bounds
 from surgsim.control.rcm import fill_rcm
-from surgsim.tick.arrays import A1, A2, Array, Control, Seen, law_signature, resolver_signature, type_of
+from surgsim.tick.arrays import (
+    A1,
+    A2,
+    Array,
+    Control,
+    Kernel,
+    Seen,
+    law_signature,
+    resolver_signature,
+    type_of,
+)
 from surgsim.tick.nominal import copy_model, dynamics, kinematics
 from surgsim.tick.status import GOES_ON
 
@@ -40,7 +50,7 @@ class Minds(NamedTuple):
     port: Array
 
 
-MINDS = types.NamedTuple([A1, A1, A1, A1, A1, A1, A2, A2], Minds)
+MINDS = types.NamedTuple([A1, A1, A1, A1, A1, A1, A2, A2], Minds)  # type: ignore[no-untyped-call]
 
 
 @cache
@@ -57,7 +67,7 @@ def decide_signature(n: int) -> Any:
 
 
 @compiled
-def decide(c: Control, minds: Minds, estimator: Any, resolver: Any, law: Any) -> int:
+def decide(c: Control, minds: Minds, estimator: Kernel, resolver: Kernel, law: Kernel) -> int:
     """Fill the answers in `c` from the measured state and the command in it."""
     seen = c.seen
     _refer(c, minds)

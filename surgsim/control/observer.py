@@ -71,7 +71,10 @@ def observe(
 
 
 def delay_size(n: int, most: int) -> int:
-    """Length of the delay estimate's memory: commands (most + 1, n), scores (most + 1,), offset (n,), ticks."""
+    """Length of the delay estimate's memory: commands, scores, offset and ticks.
+
+    `most` is the longest delay in periods, n the number of joints.
+    """
     return (most + 1) * (n + 1) + n + 1
 
 

@@ -94,7 +94,7 @@ class ContactWatch:
 
 @compiled
 def forbidden_contact(watch: Watch, p_WC: Array) -> tuple[int, int, float]:
-    """Capsule, what it touches and how deep [m], for a port at `p_WC` (3,) [m]; `NOTHING` where all is well."""
+    """Capsule, what it touches and how deep [m], for a port at `p_WC` (3,) [m]; `NOTHING`: all is well."""
     xpos, xmat, bodies, local = watch.xpos, watch.xmat, watch.bodies, watch.local
     radii, pairs, shaft, patient, ends = watch.radii, watch.pairs, watch.shaft[0], watch.patient, watch.ends
     for i in range(len(bodies)):

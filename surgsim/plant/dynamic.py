@@ -2,7 +2,8 @@
 
 import math
 from collections.abc import Sequence
-from typing import Any, Literal
+from functools import partial
+from typing import Literal
 
 import mujoco
 import numpy as np
@@ -42,7 +43,7 @@ from surgsim.plant.world import (
     measured,
     overrides,
 )
-from surgsim.tick.arrays import World
+from surgsim.tick.arrays import Kernel, World
 from surgsim.tick.mujoco_calls import mj_rnePostConstraint, mj_step1, mj_step2
 from surgsim.tick.status import GOES_ON
 from surgsim.tick.views import doubles, site_place, vector
@@ -75,7 +76,7 @@ class DynamicPlantConfig(PartConfig):
 
 
 @compiled
-def clear_forces(world: World, bore: Bore, hooks: Hooks, functions: Any, t_s: float) -> int:
+def clear_forces(world: World, bore: Bore, hooks: Hooks, functions: tuple[Kernel, ...], t_s: float) -> int:
     """Forces of the last step are forgotten, the port is moved to where it is at `t_s` [s]."""
     world.step_s = t_s
     if not world.disturbed:
@@ -95,7 +96,7 @@ def clear_forces(world: World, bore: Bore, hooks: Hooks, functions: Any, t_s: fl
 
 
 @compiled
-def look(world: World, bore: Bore, hooks: Hooks, functions: Any) -> int:
+def look(world: World, bore: Bore, hooks: Hooks, functions: tuple[Kernel, ...]) -> int:
     """Fill what is true and what is measured, after `mj_step1`."""
     see_arm(world)
     for i in range(3):
@@ -123,7 +124,7 @@ def see_arm(world: World) -> None:
 
 
 @compiled
-def begin(world: World, bore: Bore, hooks: Hooks, functions: Any) -> int:
+def begin(world: World, bore: Bore, hooks: Hooks, functions: tuple[Kernel, ...]) -> int:
     """The first instant of a run: the arm at rest is held by the torques that it needs."""
     status = clear_forces(world, bore, hooks, functions, 0.0)
     mj_step1(world.mj_model, world.mj_data)
@@ -134,7 +135,7 @@ def begin(world: World, bore: Bore, hooks: Hooks, functions: Any) -> int:
 
 
 @compiled
-def advance_dynamics(world: World, bore: Bore, hooks: Hooks, functions: Any) -> int:
+def advance_dynamics(world: World, bore: Bore, hooks: Hooks, functions: tuple[Kernel, ...]) -> int:
     """Let `world.torque`, saturated at the limits, act for one control period."""
     m, d, ctrl = world.mj_model, world.mj_data, vector(world.ctrl, world.first_ctrl + world.q.size)
     for i in range(world.q.size):
@@ -292,7 +293,7 @@ class DynamicPlant:
             kernel, call = part.kernels.get(name), None
             if kernel is None and kind not in (BEFORE_STEP, AFTER_STEP) and overrides(part, name):
                 call = hook_call(
-                    part, kind, self._scene, self._data, self.world, lambda n=number: self._own_slice(n)
+                    part, kind, self._scene, self._data, self.world, partial(self._own_slice, number)
                 )
             if kernel is not None or call is not None:
                 found.append(Hook(kind=kind, part=number, rank=part.rank, kernel=kernel, call=call))

@@ -18,7 +18,7 @@ from surgsim.models.build import Scene
 from surgsim.plant.bore import Bore
 from surgsim.plant.part import PlantPart
 from surgsim.plant.state import State
-from surgsim.tick.arrays import A1, I1, I2, World, hook_signature, type_of
+from surgsim.tick.arrays import A1, I1, I2, Kernel, World, hook_signature, type_of
 from surgsim.tick.python_part import PythonPart, python_kernel
 from surgsim.tick.status import GOES_ON
 
@@ -59,7 +59,7 @@ class Hooks(NamedTuple):
     values: Array
 
 
-HOOKS = types.NamedTuple([I2, I1, I2, A1, A1, A1], Hooks)
+HOOKS = types.NamedTuple([I2, I1, I2, A1, A1, A1], Hooks)  # type: ignore[no-untyped-call]
 
 
 @cache
@@ -69,7 +69,7 @@ def advance_signature(n: int) -> Any:
 
 
 @compiled
-def call_hooks(kind: int, functions: Any, hooks: Hooks, world: World) -> int:
+def call_hooks(kind: int, functions: tuple[Kernel, ...], hooks: Hooks, world: World) -> int:
     """Call all hooks of a kind; the first status that does not go on."""
     for i in range(hooks.counts[kind]):
         slot = hooks.order[kind, i]
@@ -222,7 +222,7 @@ class HookTable:
 
 def _in_python(hook: Hook) -> bool:
     """Whether a hook is entered in Python: a method, or a kernel without its decorator."""
-    return hook.call is not None or not (is_jitted(hook.kernel) or numba.config.DISABLE_JIT)
+    return hook.call is not None or not (is_jitted(hook.kernel) or vars(numba.config)["DISABLE_JIT"])
 
 
 def overrides(part: PlantPart, hook: str) -> bool:

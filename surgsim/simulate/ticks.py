@@ -20,7 +20,19 @@ from surgsim.plant.world import HOOKS, Hooks, advance_signature, function_types
 from surgsim.simulate.safety import Guard, is_safe
 from surgsim.simulate.stop import Stop, brake
 from surgsim.tick.algebra import dot, times
-from surgsim.tick.arrays import A1, A2, I1, Control, Feedback, Record, Seen, World, task_signature, type_of
+from surgsim.tick.arrays import (
+    A1,
+    A2,
+    I1,
+    Control,
+    Feedback,
+    Kernel,
+    Record,
+    Seen,
+    World,
+    task_signature,
+    type_of,
+)
 from surgsim.tick.clock import thread_time
 from surgsim.tick.nominal import kinematics
 from surgsim.tick.status import GOES_ON, INFEASIBLE, RANK_LOST, TOLD
@@ -142,7 +154,7 @@ class Run(Record):
     feedback: Feedback
 
 
-TABLES = types.NamedTuple([A2, I1, A1, A1, WATCH, HOOKS, MINDS], Tables)
+TABLES = types.NamedTuple([A2, I1, A1, A1, WATCH, HOOKS, MINDS], Tables)  # type: ignore[no-untyped-call]
 
 
 @cache
@@ -191,7 +203,7 @@ def _put_some(row: Array, at: int, values: Array, count: int) -> None:
 @compiled
 def _begin_row(p: Progress, rows: Array, at: Ids, world: World, values: Array) -> Array:
     """The next row with what is known of every tick, also of one that ends the run or follows."""
-    row = rows[p.rows]
+    row: Array = rows[p.rows]
     p.rows += 1
     row[at[T]] = world.t_s
     _put(row, at[Q], world.q)
@@ -249,7 +261,7 @@ def _is_finite(values: Array) -> bool:
 
 
 @compiled
-def ask_task(run: Run, tables: Tables, c: Control, world: World, task: Any) -> int:
+def ask_task(run: Run, tables: Tables, c: Control, world: World, task: Kernel) -> int:
     """The task's command for the present state, once a tick."""
     told = run.feedback
     told.t_s = world.t_s
@@ -274,8 +286,8 @@ def _act(
     world: World,
     bore: Bore,
     hooks: Hooks,
-    advance: Any,
-    functions: Any,
+    advance: Kernel,
+    functions: tuple[Kernel, ...],
 ) -> int:
     """Hand the command to the plant and let one period pass."""
     for i in range(torque.size):
@@ -291,9 +303,14 @@ def _is_last(p: Progress, c: Control, world: World) -> bool:
 
 
 @compiled
+def _has_no_answer(status: int) -> bool:
+    return status in (INFEASIBLE, RANK_LOST)
+
+
+@compiled
 def _bridges(p: Progress, c: Control, world: World, status: int) -> bool:
     """Whether the tick in which the controller has no answer is bridged by braking."""
-    infeasible = status == INFEASIBLE or status == RANK_LOST
+    infeasible = _has_no_answer(status)
     if infeasible:
         p.infeasible += 1
     return infeasible and p.infeasible <= p.most_infeasible and not _is_last(p, c, world)
@@ -309,12 +326,12 @@ def run_ticks(
     bore: Bore,
     guard: Guard,
     stop: Stop,
-    task: Any,
-    estimator: Any,
-    resolver: Any,
-    law: Any,
-    advance: Any,
-    functions: Any,
+    task: Kernel,
+    estimator: Kernel,
+    resolver: Kernel,
+    law: Kernel,
+    advance: Kernel,
+    functions: tuple[Kernel, ...],
 ) -> int:
     """Run up to `ticks` ticks; how many rows were begun. `run.progress` says why it came back."""
     p, at, hooks, minds = run.progress, tables.at, tables.hooks, tables.minds
@@ -342,7 +359,7 @@ def run_ticks(
                 return k + 1
             status = _act(c.torque, c.resolved.qdot, c.command.jaw, world, bore, hooks, advance, functions)
         else:
-            row[at[INFEASIBLE_AT]] = 1.0 if status == INFEASIBLE or status == RANK_LOST else 0.0
+            row[at[INFEASIBLE_AT]] = 1.0 if _has_no_answer(status) else 0.0
             if status == TOLD or not _bridges(p, c, world, status):
                 p.reason, p.status = FAILED, status
                 return k + 1
@@ -371,10 +388,10 @@ def hold_ticks(
     world: World,
     bore: Bore,
     stop: Stop,
-    advance: Any,
-    functions: Any,
+    advance: Kernel,
+    functions: tuple[Kernel, ...],
 ) -> int:
-    """The stop after the outcome: up to `ticks` rows without a command, until the state diverges; their number."""
+    """The stop after the outcome: rows without a command, until the state diverges; their number."""
     p, at, hooks = run.progress, tables.at, tables.hooks
     for k in range(ticks):
         if not (_is_finite(world.q_m) and _is_finite(world.v_m)):

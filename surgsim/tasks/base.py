@@ -217,7 +217,7 @@ class PathTaskConfig(PartConfig, ABC):
 
 
 PathKernel = Callable[[Array, float, Array], None]
-"""path(numbers, s, rows): fills point [m], first and second derivative by s (3, 3), from the origin at s = 0."""
+"""path(numbers, s, rows): fills point [m] and first and second derivative by s (3, 3), from the origin."""
 HOLD, DURATION, RAMP, START, ROTATION, NUMBERS = 0, 1, 2, 3, 6, 15
 """Where the gains of a path task begin: times [s], start (3,) [m], R_PW (3, 3), the path's own numbers."""
 

@@ -1,6 +1,6 @@
 """Small dense linear algebra for kernels: nothing allocated but what is returned, nothing raised.
 
-Loops in a fixed order, so that the compiled and the Python form give the same bits, which BLAS does not promise.
+Loops in a fixed order: the compiled and the Python form give the same bits, which BLAS does not promise.
 """
 
 import math

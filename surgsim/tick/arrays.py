@@ -1,14 +1,16 @@
 """The records of a tick, and the signature of each kind of kernel that works on them.
 
-A part's law is a function: its gains, what it may see, its memory, and where its answer goes. It returns a status
-of `surgsim.tick.status`, allocates nothing that shows and raises nothing. What it sees and what it answers are
-records: plain C structs, one piece of memory each, read by name as `seen.q` or `seen.Jv_WT[i, j]` in Python and in
-compiled code alike. A record's layout follows from its class here and the number of joints n; compiled code
-gets a pointer to it. The same function runs as Python and compiled, with the same result bit for bit.
+A part's law is a function: its gains, what it may see, its memory, and where its answer goes. It returns a
+status of `surgsim.tick.status`, allocates nothing that shows and raises nothing. What it sees and what it
+answers are records: plain C structs, one piece of memory each, read by name as `seen.q` or `seen.Jv_WT[i, j]`
+in Python and in compiled code alike. A record's layout follows from its class here and the number of joints n;
+compiled code gets a pointer to it. The same function runs as Python and compiled, with the same result bit for
+bit.
 
 Notation of the names: docs/notation.md. Frames W world, T tip, C trocar.
 """
 
+from collections.abc import Callable
 from functools import cache
 from typing import Any, ClassVar, get_type_hints
 
@@ -17,6 +19,7 @@ from numba import from_dtype, types
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+Kernel = Callable[..., int]
 Ids = NDArray[np.int64]
 
 A1 = types.float64[::1]
@@ -40,7 +43,7 @@ class Record:
 
 
 @cache
-def layout(kind: type[Record], n: int) -> np.dtype[Any]:
+def layout(kind: Any, n: int) -> np.dtype[Any]:
     """Memory layout of a record for `n` joints: C's, with its alignment."""
     fields: list[tuple[Any, ...]] = []
     for name, hint in get_type_hints(kind).items():
@@ -60,7 +63,7 @@ def new(kind: type[Record], n: int) -> Any:
 
 
 @cache
-def type_of(kind: type[Record], n: int) -> Any:
+def type_of(kind: Any, n: int) -> Any:
     """Numba's type of a record."""
     return from_dtype(layout(kind, n))
 

@@ -1,9 +1,7 @@
 """The nominal model of the arm, evaluated from compiled code."""
 
-from typing import Any
-
 from surgsim.compiled import compiled
-from surgsim.tick.arrays import Array, Model
+from surgsim.tick.arrays import Array, Model, Seen
 from surgsim.tick.mujoco_calls import (
     mj_comPos,
     mj_comVel,
@@ -50,7 +48,7 @@ def dynamics(model: Model, v: Array) -> None:
 
 
 @compiled
-def copy_model(a: Any, b: Any) -> None:
+def copy_model(a: Model | Seen, b: Model | Seen) -> None:
     """Copy what was evaluated from a record with a model's fields to another."""
     b.q[:] = a.q
     b.v[:] = a.v

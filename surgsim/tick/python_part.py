@@ -1,7 +1,7 @@
 """A Python part as a kernel of the compiled loop.
 
-The loop knows kernels alone. For a part that is Python by nature it is given the trampoline of its kind, whose
-gains hold the address of a C function that enters Python. The part shares its arrays with the loop, so
+The loop knows kernels alone. For a part that is Python by nature it is given a trampoline, whose gains hold the
+address of a C function that enters Python. The part shares its arrays with the loop, so
 nothing is handed over but the call. An exception cannot pass through compiled code: it is kept, the tick ends
 with the status `TOLD`, and whoever runs the loop raises it again.
 """

@@ -96,7 +96,7 @@ def _is_independent(d: Array, q: int) -> bool:
 
 @compiled
 def _append(K: Array, R: Array, q: int, d: Array, w: Array) -> None:
-    """The row with the image d becomes the q-th active: reflect K's rows q.. so that d ends there; d is spent."""
+    """The row with the image d becomes the q-th active: reflect K's rows q.., so that d ends there."""
     n = d.size
     s = 0.0
     for i in range(q, n):
@@ -155,7 +155,7 @@ def _bounds(lower: Array, upper: Array, G_lower: Array, G_upper: Array, k: int) 
 def _miss(
     x: Array, lower: Array, upper: Array, G: Array, G_lower: Array, G_upper: Array, k: int
 ) -> tuple[float, int]:
-    """By how much row k is missed, relative to its length and bound, and on which side; (0, 0) if it is kept."""
+    """By how much row k is missed, relative to its length and bound, and on which side; (0, 0) if kept."""
     n = x.size
     low, high = _bounds(lower, upper, G_lower, G_upper, k)
     if k < n:
@@ -184,7 +184,7 @@ def _begin(
     work: Array,
     active: Ids,
 ) -> tuple[int, int]:
-    """Take in the equalities, then the guess in `side`; counts of all active rows and of equalities, or -1."""
+    """Take in the equalities, then the guess in `side`; numbers of active rows and of equalities, or -1."""
     n = lower.size
     K, R, b, multiplier = work[:n], work[n : 2 * n], work[2 * n], work[2 * n + 2]
     d, w = work[2 * n + 4, :n], work[2 * n + 6]
@@ -247,7 +247,7 @@ def _blocking(
 def _exchange(
     R: Array, q: int, equal: int, d: Array, r: Array, way: int, side: Ids, active: Ids, multiplier: Array
 ) -> tuple[float, int, float]:
-    """For a row that depends on the active ones: the dual step to it, the row that leaves, the row's length."""
+    """For a row that depends on the active ones: the dual step, the row that leaves, the row's length."""
     size = 1.0
     for i in range(q - 1, -1, -1):
         s = d[i]

@@ -40,7 +40,9 @@ class PinvConfig(PartConfig):
 
 @compiled
 def pinv(gains: Array, seen: Seen, memory: Array, out: Resolved) -> int:
-    """Least joint velocity, q' = pinv(J) v, eq. (2)-(5) of the manipulability paper, projected on Omega.
+    """The least joint velocity that moves the tip as asked, projected on Omega.
+
+        q' = pinv(J) v,    eq. (2)-(5) of the manipulability paper
 
     J = J_T (3, n), or [J_T; J_rcm] (5, n); v is the desired velocity with feedback, see `task_rows`.
     """

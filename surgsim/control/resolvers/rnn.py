@@ -52,7 +52,7 @@ class RnnConfig(PartConfig):
     step_over_epsilon: Annotated[float, Field(gt=0.0, le=1.0)] = 0.05
 
     def build(self, arm: ArmModel) -> KernelResolver:
-        """The resolver; memory omega (n,), phi (9,), sigma (9,), lam (r,), the neural states of eq. (6)-(9)."""
+        """The resolver; memory omega (n,), phi (9,), sigma (9,), lam (r,), the states of eq. (6)-(9)."""
         gains = np.array(
             [
                 self.c0,

@@ -126,7 +126,7 @@ def vprnn(gains: Array, seen: Seen, memory: Array, out: Resolved) -> int:
 
 @compiled
 def network_rows(gains: Array, seen: Seen) -> tuple[Array, Array]:
-    """Rows [J_T; J_rcm] (m, n) and right side [v_d; v_rcm] (m,) of eq. (20), with the RCM rows of the form."""
+    """Rows [J_T; J_rcm] (m, n) and right side [v_d; v_rcm] (m,) of eq. (20)."""
     n, wide = seen.q.size, gains[CROSS] != 0.0
     r = 0 if seen.rows == 0 else (3 if wide else 2)
     J, v = np.empty((3 + r, n)), np.empty(3 + r)

@@ -216,7 +216,7 @@ def predict(
 def _task_accelerations(
     gains: Array, seen: Seen, model: Model, late: float, share: float, J: Array, a: Array
 ) -> None:
-    """Fill rows J (m, n) and accelerations a (m,) of tip and RCM at the state of `model`, `late` [s] from now."""
+    """Fill rows J (m, n) and accelerations a (m,) of tip and RCM at `model`'s state, `late` [s] from now."""
     linear, angular, rate = np.empty(3), np.empty(3), np.empty(3)
     fill_velocity_products(model.Jv_WT, model.z_W, model.v, linear, angular)
     ahead = max(late - gains[SENSOR_DELAY], 0.0)

@@ -35,7 +35,8 @@ def euler_deltas(at: Instant, beta: float, period_s: float) -> tuple[Array, Arra
     W, l, resolver = net.W, net.l, net.resolver  # noqa: E741 - the paper's name
     first = max(0, round((limit_s(period_s, beta) - _BEFORE_S) / period_s))
     problem = replace(at.problem, t_s=first * period_s, dt_s=period_s)
-    memory, sizes = resolver.start(problem), [float(np.linalg.norm(l))]
+    sizes = [float(np.linalg.norm(l))]
+    memory: Array | None = None
     for k in range(first, first + round((_BEFORE_S + _AFTER_S) / period_s)):
         try:
             _, memory = resolver.step(replace(problem, t_s=k * period_s), memory)
