@@ -48,7 +48,7 @@ class Watch(NamedTuple):
     ends: Array
 
 
-WATCH = types.NamedTuple([A2, A2, I1, A3, A1, I2, I1, A2, A3], Watch)
+WATCH = types.NamedTuple([A2, A2, I1, A3, A1, I2, I1, A2, A3], Watch)  # type: ignore[no-untyped-call]
 
 
 class ContactWatch:

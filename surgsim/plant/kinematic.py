@@ -1,7 +1,7 @@
 """Kinematic plant: perfect velocity tracking, the setting of the manipulability paper."""
 
 from collections.abc import Sequence
-from typing import Literal
+from typing import Any, Literal
 
 import mujoco
 import numpy as np

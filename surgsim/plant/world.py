@@ -36,7 +36,7 @@ BLOCK_TICKS = 1024
 @cache
 def function_types(n: int) -> Any:
     """Type of the hooks' kernels as one parameter, for n joints."""
-    return types.UniTuple(types.FunctionType(hook_signature(n)), SLOTS)
+    return types.UniTuple(types.FunctionType(hook_signature(n)), SLOTS)  # type: ignore[no-untyped-call]
 
 
 class Hooks(NamedTuple):
@@ -74,7 +74,7 @@ def call_hooks(kind: int, functions: tuple[Kernel, ...], hooks: Hooks, world: Wo
     for i in range(hooks.counts[kind]):
         slot = hooks.order[kind, i]
         at = hooks.places[slot]
-        status = functions[slot](
+        status: int = functions[slot](
             hooks.gains[at[0] : at[1]], world, hooks.memory[at[2] : at[3]], hooks.values[at[4] : at[5]]
         )
         if status != GOES_ON:

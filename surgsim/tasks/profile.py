@@ -40,7 +40,7 @@ class Profile:
 
 @compiled
 def progress(hold: float, duration: float, ramp: float, t_s: float) -> tuple[float, float, float]:
-    """Progress (s, s', s'') [-, 1/s, 1/s^2] at `t_s` [s]: a hold, then `duration` with ramps of `ramp` [s]."""
+    """Progress (s, s', s'') [-, 1/s, 1/s^2] at `t_s` [s]: a hold, then `duration` with ramps `ramp` [s]."""
     t = t_s - hold
     if t <= 0.0:
         return 0.0, 0.0, 0.0

@@ -1,11 +1,11 @@
 """The records of a tick, and the signature of each kind of kernel that works on them.
 
 A part's law is a function: its gains, what it may see, its memory, and where its answer goes. It returns a
-status of `surgsim.tick.status`, allocates nothing that shows and raises nothing. What it sees and what it
-answers are records: plain C structs, one piece of memory each, read by name as `seen.q` or `seen.Jv_WT[i, j]`
-in Python and in compiled code alike. A record's layout follows from its class here and the number of joints n;
-compiled code gets a pointer to it. The same function runs as Python and compiled, with the same result bit for
-bit.
+status of `surgsim.tick.status`, allocates nothing that shows and raises nothing. What it sees and answers
+are records: plain C structs, one piece of memory each, read by name as `seen.q` or `seen.Jv_WT[i, j]` in
+Python and in compiled code. A record's layout follows from its class here and the number of joints n;
+compiled code gets a pointer to it. The same function runs as Python and compiled, with the same result bit
+for bit.
 
 Notation of the names: docs/notation.md. Frames W world, T tip, C trocar.
 """
@@ -51,13 +51,14 @@ def layout(kind: Any, n: int) -> np.dtype[Any]:
             shape = tuple(n if size == "n" else int(size) for size in kind.SHAPES[name].split())
             fields.append((name, np.float64, shape))
         elif isinstance(hint, type) and issubclass(hint, Record):
-            fields.append((name, layout(hint, n)))
+            inner: Any = hint
+            fields.append((name, layout(inner, n)))
         elif hint in (float, int):
             fields.append((name, np.float64 if hint is float else np.int64))
     return np.dtype(fields, align=True)
 
 
-def new(kind: type[Record], n: int) -> Any:
+def new(kind: Any, n: int) -> Any:
     """A record of zeros."""
     return np.zeros(1, layout(kind, n)).view(np.recarray)[0]
 

@@ -1,9 +1,9 @@
 """A Python part as a kernel of the compiled loop.
 
-The loop knows kernels alone. For a part that is Python by nature it is given a trampoline, whose gains hold the
-address of a C function that enters Python. The part shares its arrays with the loop, so
-nothing is handed over but the call. An exception cannot pass through compiled code: it is kept, the tick ends
-with the status `TOLD`, and whoever runs the loop raises it again.
+The loop knows kernels alone. For a part that is Python by nature it is given a trampoline, whose gains hold
+the address of a C function that enters Python. The part shares its arrays with the loop, so nothing is
+handed over but the call. An exception cannot pass through compiled code: it is kept, the tick ends with a
+status, and whoever runs the loop raises it again.
 """
 
 import ctypes
@@ -77,7 +77,7 @@ def _enter_part(bits: float) -> int:
 @overload(_enter_part)
 def _enter_part_in_kernels(bits: Any) -> Any:
     def enter(bits: Any) -> Any:
-        return _enter_address(bits)
+        return _enter_address(bits)  # type: ignore[call-arg]
 
     return enter
 

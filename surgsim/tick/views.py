@@ -4,7 +4,7 @@ import ctypes
 from typing import Any
 
 import numpy as np
-from numba import carray, types
+from numba import carray, types  # type: ignore[attr-defined]
 from numba.core import cgutils
 from numba.extending import intrinsic, overload
 
@@ -32,7 +32,7 @@ def doubles(address: int, rows: int, columns: int) -> Array:
 @overload(doubles)
 def _doubles(address: Any, rows: Any, columns: Any) -> Any:
     def view(address: Any, rows: Any, columns: Any) -> Any:
-        return carray(_pointer(address), (rows, columns), np.float64)
+        return carray(_pointer(address), (rows, columns), np.float64)  # type: ignore[call-arg]
 
     return view
 
@@ -40,13 +40,15 @@ def _doubles(address: Any, rows: Any, columns: Any) -> Any:
 @compiled
 def vector(address: int, size: int) -> Array:
     """The doubles at `address` as an array (size,), not copied."""
-    return doubles(address, 1, size)[0]
+    place: Array = doubles(address, 1, size)[0]
+    return place
 
 
 @compiled
 def applied_wrench(world: World, body: int) -> Array:
     """Applied force and torque on a body (6,) [N, N m], about its centre of mass, world frame."""
-    return doubles(world.xfrc_applied, world.nbody, 6)[body]
+    place: Array = doubles(world.xfrc_applied, world.nbody, 6)[body]
+    return place
 
 
 @compiled
@@ -65,22 +67,26 @@ def push_at(world: World, body: int, point: Array, force: Array) -> None:
 @compiled
 def body_place(world: World, body: int) -> Array:
     """Place of a body (3,) [m]."""
-    return doubles(world.xpos, world.nbody, 3)[body]
+    place: Array = doubles(world.xpos, world.nbody, 3)[body]
+    return place
 
 
 @compiled
 def centre_of_mass(world: World, body: int) -> Array:
     """Centre of mass of a body (3,) [m]."""
-    return doubles(world.xipos, world.nbody, 3)[body]
+    place: Array = doubles(world.xipos, world.nbody, 3)[body]
+    return place
 
 
 @compiled
 def site_place(world: World, site: int) -> Array:
     """Place of a site (3,) [m]."""
-    return doubles(world.site_xpos, world.nsite, 3)[site]
+    place: Array = doubles(world.site_xpos, world.nsite, 3)[site]
+    return place
 
 
 @compiled
 def site_turn(world: World, site: int) -> Array:
     """Orientation of a site (9,), row by row."""
-    return doubles(world.site_xmat, world.nsite, 9)[site]
+    place: Array = doubles(world.site_xmat, world.nsite, 9)[site]
+    return place
