@@ -1,58 +1,91 @@
-"""The project's own speed figures: how many times faster than real time, and where the time goes."""
+"""The project's own speed figures: what a tick costs, in physics steps of the same model.
 
-from pathlib import Path
-from tempfile import TemporaryDirectory
+Ticks and bare `mj_step` are measured in turn, chunk by chunk, in thread time, and the median of
+the chunks' ratios counts: what else the machine does slows both alike.
+"""
+
+import statistics
+import time
+from collections.abc import Callable
 from typing import Any
 
-from surgsim.compiled.watch import working_time
+import mujoco
+
 from surgsim.errors import SurgsimError
-from surgsim.metrics.catalog import compute_metrics
-from surgsim.recording.write import write_recording
 from surgsim.scenario.load import load_scenario, shipped
+from surgsim.scenario.schema import Scenario
 from surgsim.simulate.loop import Simulation
 from surgsim.simulate.setup import prepare
 
 _SCENARIO = "circle_lwr4plus"
+_CHUNK = 256
 _NEEDS = {"rcm_interaction_force": ("trocar.wall={}",)}
 """What a controller needs in the scenario to be run at all."""
+OTHERS = ("theatre_lwr4plus", "teleop_free_motion_panda")
+"""Scenarios that are measured with their own controller."""
 
 
 def bench(duration_s: float, repeat: int) -> list[dict[str, Any]]:
-    """Best of `repeat` runs of the circle with every shipped controller, `duration_s` [s] each.
+    """A row for the circle with every shipped controller, and for each of `OTHERS`.
+
+    Args:
+        duration_s: Simulated time of a run [s].
+        repeat: Runs of each; the chunks of all count.
 
     Raises:
         SurgsimError: If the duration or count is not positive.
     """
     if not (duration_s >= 1.0 and repeat >= 1):
         raise SurgsimError("bench needs a duration of at least 1 s and at least one repeat")
-    return [
-        min((_once(name, duration_s) for _ in range(repeat)), key=lambda row: row["wall_s"])
-        for name in shipped("controllers")
-    ]
+    rows = [_row(f"circle, {name}", _circle(name), duration_s, repeat) for name in shipped("controllers")]
+    return [*rows, *(_row(name, load_scenario(name), duration_s, repeat) for name in OTHERS)]
 
 
-def _once(controller: str, duration_s: float) -> dict[str, Any]:
-    settings = [
-        f"task.duration_s={duration_s}",
-        "task.ramp_s=0.5",
-        "task.hold_start_s=0",
-        "task.hold_end_s=0",
-        *_NEEDS.get(controller, ()),
-    ]
-    scenario = load_scenario(_SCENARIO, controller=controller, assignments=settings)
+def _circle(controller: str) -> Scenario:
+    return load_scenario(_SCENARIO, controller=controller, assignments=_NEEDS.get(controller, ()))
+
+
+def _row(name: str, scenario: Scenario, duration_s: float, repeat: int) -> dict[str, Any]:
+    """Ticks against bare steps."""
+    began = time.thread_time()
     setup = prepare(scenario)
-    began = working_time()
-    trace = Simulation(setup).run()
-    simulated = working_time()
-    metrics = compute_metrics(trace)
-    with TemporaryDirectory() as folder:
-        write_recording(Path(folder) / "recording.rrd", trace, metrics)
-    ended = working_time()
+    Simulation(setup).advance(1)
+    start_s = time.thread_time() - began
+    chunks = [chunk for _ in range(repeat) for chunk in _chunks(scenario, duration_s)]
+    period = scenario.simulation.control_period_s
+    tick_s = statistics.median(tick for tick, _ in chunks)
     return {
-        "controller": controller,
-        "real_time_factor": duration_s / (ended - began),
-        "without_recording": duration_s / (simulated - began),
-        "control_p50_us": metrics["control_time_p50_us"],
-        "control_p99_us": metrics["control_time_p99_us"],
-        "wall_s": ended - began,
+        "run": name,
+        "ratio": statistics.median(tick / step for tick, step in chunks),
+        "tick_us": 1e6 * tick_s,
+        "mj_step_us": 1e6 * statistics.median(step for _, step in chunks),
+        "real_time_factor": period / tick_s,
+        "start_up_s": start_s,
     }
+
+
+def _chunks(scenario: Scenario, duration_s: float) -> list[tuple[float, float]]:
+    """Thread time of a tick, and of the bare steps of its period, chunk by chunk [s]; the first warms up."""
+    setup = prepare(scenario)
+    simulation, model = Simulation(setup), setup.scene.model
+    data = mujoco.MjData(model)
+    data.qpos[setup.scene.qpos_ids] = setup.q_start
+    period = scenario.simulation.control_period_s
+    substeps = round(period / model.opt.timestep)
+    measured: list[tuple[float, float]] = []
+    while not simulation.ended and simulation.time_s + _CHUNK * period <= duration_s:
+        tick = _time(lambda: simulation.advance(_CHUNK))
+        if simulation.ended:
+            break
+        step = _time(lambda: mujoco.mj_step(model, data, nstep=_CHUNK * substeps))
+        data.qpos[setup.scene.qpos_ids], data.qvel[:] = simulation.state.q, 0.0
+        measured.append((tick / _CHUNK, step / _CHUNK))
+    if len(measured) < 2:
+        raise SurgsimError(f"{scenario.name}: the run ended before two chunks of {_CHUNK} ticks")
+    return measured[1:]
+
+
+def _time(call: Callable[[], None]) -> float:
+    began = time.thread_time()
+    call()
+    return time.thread_time() - began

@@ -168,6 +168,14 @@ class Simulation:
         if not self.ended:
             self._advance_by(1)
 
+    def advance(self, ticks: int) -> None:
+        """Up to `ticks` control periods, as `tick` would; fewer where the run ends."""
+        left = ticks
+        while left > 0 and not self.ended:
+            block = min(left, BLOCK_TICKS - int(self._setup.plant.world.tick) % BLOCK_TICKS)
+            self._advance_by(block)
+            left -= block
+
     def _advance_by(self, ticks: int) -> None:
         plant, controller = self._setup.plant, self._setup.controller
         plant.refill()

@@ -2,12 +2,12 @@
 
 import math
 
-from surgsim.runs.bench import bench
+from surgsim.runs.bench import OTHERS, bench
 from surgsim.scenario.load import shipped
 
 
 def test_every_shipped_controller_is_measured():
     rows = bench(1.0, 1)
-    assert [row["controller"] for row in rows] == list(shipped("controllers"))
-    figures = [value for row in rows for name, value in row.items() if name != "controller"]
+    assert [row["run"] for row in rows] == [*(f"circle, {name}" for name in shipped("controllers")), *OTHERS]
+    figures = [value for row in rows for name, value in row.items() if name != "run"]
     assert all(math.isfinite(value) and value > 0.0 for value in figures)
