@@ -10,7 +10,7 @@ from numba.extending import overload
 from surgsim.compiled import compiled
 
 _CLOCK = getattr(time, "CLOCK_THREAD_CPUTIME_ID", 3)
-_clock_gettime = types.ExternalFunction("clock_gettime", types.int32(types.int32, types.intp))
+_clock_gettime: Any = types.ExternalFunction("clock_gettime", types.int32(types.int32, types.intp))
 
 
 def _now() -> float:
@@ -23,7 +23,8 @@ def _now_compiled() -> float:
     now = np.zeros(2, dtype=np.int64)
     if _clock_gettime(_CLOCK, now.ctypes.data) != 0:
         return np.nan
-    return now[0] + 1e-9 * now[1]
+    seconds: float = now[0] + 1e-9 * now[1]
+    return seconds
 
 
 @overload(_now)

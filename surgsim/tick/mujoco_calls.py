@@ -53,7 +53,7 @@ _P, _I = types.intp, types.int32
 
 def _function(name: str, *arguments: Any) -> Any:
     """A function of MuJoCo by its symbol; through ctypes where kernels run as Python (NUMBA_DISABLE_JIT)."""
-    if not numba.config.DISABLE_JIT:
+    if not vars(numba.config)["DISABLE_JIT"]:
         return types.ExternalFunction(name, types.void(*arguments))
     function = getattr(ctypes.CDLL(_LIBRARY), name)
     function.argtypes = [ctypes.c_void_p if kind is _P else ctypes.c_int for kind in arguments]
