@@ -19,12 +19,13 @@ from typing import Any
 import llvmlite
 import numba
 import numpy as np
+from numba.core.extending import _Intrinsic
 from numba.core.serialize import dumps
 from numba.core.types import Type
 from numba.core.typing.templates import Signature
 from numba.extending import is_jitted
 
-_KNOWN_TO_NUMBA = frozenset({"builtins", "cmath", "math", "numba", "numpy", "operator"})
+_KNOWN_TO_NUMBA = frozenset({"builtins", "cmath", "ctypes", "math", "numba", "numpy", "operator"})
 _PLAIN = (type(None), type(...), bool, int, float, complex, str, bytes)
 _SETTINGS = ("OPT", "BOUNDSCHECK", "LOOP_VECTORIZE", "SLP_VECTORIZE", "ENABLE_AVX")
 _MOST_VALUES = 20_000
@@ -86,6 +87,9 @@ class _Walk:
             kernel: Any = value
             self.put("kernel", repr(sorted(kernel.targetoptions.items())))
             self._function(kernel.py_func)
+        elif isinstance(value, _Intrinsic):  # its own pickle holds a number that is new in every process
+            self.put("intrinsic")
+            self._function(value._defn)
         elif isinstance(value, Type):
             self._type(value)
         elif isinstance(value, Signature):
