@@ -62,7 +62,10 @@ def test_it_runs_a_shipped_scenario_by_name_from_anywhere(wheel: Path, tmp_path:
     place = python("-c", "import surgsim; print(surgsim.__file__)").strip()
     assert Path(place).is_relative_to(target)
     listed = json.loads(python("-m", "surgsim", "list", "scenarios", "--json"))
-    assert {item["name"] for item in listed} == {path.stem for path in (ROOT / "scenarios").glob("*.yaml")}
+    assert {item["name"] for item in listed} == {
+        *(path.stem for path in (ROOT / "scenarios").glob("*.yaml")),
+        *(f"safety/{path.stem}" for path in (ROOT / "scenarios" / "safety").glob("*.yaml")),
+    }
     short = ("--set", "task.duration_s=2", "--set", "task.hold_end_s=0")
     text = python("-m", "surgsim", "run", "circle_lwr4plus", "--no-record", "--json", "--out", "run", *short)
     assert json.loads(text)["outcome"]["t_s"] == pytest.approx(2.5)

@@ -18,7 +18,7 @@ from surgsim.plant.bore import Bore, act, drag, wall_force
 from surgsim.plant.bystanders import joint_columns
 from surgsim.plant.contacts import ContactWatch
 from surgsim.plant.ledger import EnergyLedger
-from surgsim.plant.part import PlantPart
+from surgsim.plant.part import BLOCK_TICKS, PlantPart
 from surgsim.plant.port import Port
 from surgsim.plant.records import world_of
 from surgsim.plant.state import State
@@ -27,7 +27,6 @@ from surgsim.plant.world import (
     ACTUATE,
     AFTER_STEP,
     BEFORE_STEP,
-    BLOCK_TICKS,
     GRIP,
     KINDS,
     PORT_MOTION,

@@ -13,6 +13,8 @@ from surgsim.models.build import Scene
 from surgsim.plant.state import State
 
 Array = NDArray[np.float64]
+BLOCK_TICKS = 1024
+"""Parts may draw their noise for so many ticks at once, from a multiple of it on."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -29,8 +29,6 @@ KINDS = ("actuate", "grip", "port_motion", "push", "before_step", "after_step", 
 ACTUATE, GRIP, PORT_MOTION, PUSH, BEFORE_STEP, AFTER_STEP, SENSE, VALUES = range(len(KINDS))
 """Kinds of hooks, in the order of a tick."""
 SLOTS = 32
-BLOCK_TICKS = 1024
-"""Parts may draw their noise for so many ticks at once, from a multiple of it on."""
 
 
 @cache

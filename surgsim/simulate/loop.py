@@ -13,8 +13,8 @@ from surgsim.columns import joints, width
 from surgsim.compiled import as_parameter
 from surgsim.errors import Outcome, SurgsimError
 from surgsim.plant.bore import Bore
+from surgsim.plant.part import BLOCK_TICKS
 from surgsim.plant.state import State
-from surgsim.plant.world import BLOCK_TICKS
 from surgsim.scenario.schema import Scenario, StopConfig
 from surgsim.simulate.objects import put_back, store
 from surgsim.simulate.rows import Rows

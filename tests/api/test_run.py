@@ -215,7 +215,7 @@ def test_progress_is_the_command_s_and_only_on_request(quick, monkeypatch, capfd
     surgsim.run("circle_lwr4plus", **quick)
     assert reached == []
     surgsim.run("circle_lwr4plus", progress=True, **quick)
-    assert reached == [("circle_lwr4plus vprnn", 0.25, 0.3)]
+    assert reached[-1] == ("circle_lwr4plus vprnn", pytest.approx(0.3), 0.3)
     assert capfd.readouterr() == ("", "")
 
 
@@ -223,7 +223,7 @@ def test_an_interrupt_leaves_no_draft(tmp_path):
     code = (
         "import surgsim, sys\n"
         "print('ready', flush=True)\n"
-        f"surgsim.run('circle_lwr4plus', task={{'duration_s': 1000.0}}, out={str(tmp_path / 'run')!r})\n"
+        f"surgsim.run('circle_lwr4plus', task={{'duration_s': 3000.0}}, out={str(tmp_path / 'run')!r})\n"
     )
     with subprocess.Popen(
         [sys.executable, "-c", code], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True

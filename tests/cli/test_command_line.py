@@ -45,6 +45,8 @@ def _set(*assignments):
 def test_every_shipped_scenario_runs(surgsim, name, tmp_path):
     path = isinstance(load_scenario(name).task, PathTaskConfig)
     short = SHORT if path else SHORT[:1]
+    if "human_push" in name:  # which begins after the end of a run cut short
+        short = (*short, "disturbances=[]")
     done = surgsim("run", name, "--no-record", "--json", "--out", "run", *_set(*short, *SLOW_LIMITS))
     assert done.returncode == 0, done.stderr
     summary = json.loads(done.stdout)
@@ -52,7 +54,8 @@ def test_every_shipped_scenario_runs(surgsim, name, tmp_path):
     last = prepare(load_scenario(name, assignments=[*short, *SLOW_LIMITS])).task.duration_s
     assert summary["outcome"]["t_s"] == pytest.approx(last)
     assert json.loads((tmp_path / "run" / "metrics.json").read_text()) == summary
-    assert re.search(rf"(^|\n)simulated {last:.1f} s [^\n]* real time[^\n]*; wrote run\n$", done.stderr)
+    said = re.sub(r"(?m)^compil(ing|ed) .*\n", "", done.stderr)  # where kernels are new
+    assert re.search(rf"(^|\n)simulated {last:.1f} s [^\n]* real time[^\n]*; wrote run\n$", said)
 
 
 def test_a_run_that_ends_early_exits_1_and_is_written_all_the_same(surgsim, tmp_path):

@@ -83,7 +83,7 @@ OPTIONS = {
     f"compare {S} --out .": "holds files that are not batch results",
     f"compare {S} --out scenario.yaml": "cannot write scenario.yaml: File exists",
     f"compare {S} --out '\0'": "cannot be used: embedded null byte",
-    "compare nothing": "'nothing' is not a shipped scenario",
+    "compare nothing": "'nothing' is not a shipped suite or scenario",
     "report nothing": "nothing is not a folder",
     "report scenario.yaml": "scenario.yaml is not a folder",
     "report .": "holds no runs.parquet",

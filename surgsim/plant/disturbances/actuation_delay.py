@@ -11,7 +11,7 @@ from pydantic import Field
 from surgsim.compiled import compiled
 from surgsim.models.build import Scene
 from surgsim.plant.disturbances.base import DELAYED, Disturbance, DisturbanceConfig, whole_ticks
-from surgsim.plant.world import BLOCK_TICKS
+from surgsim.plant.part import BLOCK_TICKS
 from surgsim.tick.arrays import World
 from surgsim.tick.status import GOES_ON
 

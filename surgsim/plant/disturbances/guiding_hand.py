@@ -12,7 +12,7 @@ from surgsim.compiled import compiled
 from surgsim.models.build import Scene
 from surgsim.models.config import Vec3
 from surgsim.plant.disturbances.base import Disturbance, DisturbanceConfig
-from surgsim.plant.world import BLOCK_TICKS
+from surgsim.plant.part import BLOCK_TICKS
 from surgsim.teleop.tremor import TremorConfig, resonance, shake
 from surgsim.tick.algebra import norm
 from surgsim.tick.arrays import World

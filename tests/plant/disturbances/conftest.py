@@ -9,9 +9,10 @@ import pytest
 from surgsim.models.build import build
 from surgsim.models.config import RobotConfig, SceneConfig, TrocarConfig
 from surgsim.plant.dynamic import DynamicPlantConfig
+from surgsim.plant.part import BLOCK_TICKS
 from surgsim.plant.records import world_of
 from surgsim.plant.state import State
-from surgsim.plant.world import BLOCK_TICKS, measured
+from surgsim.plant.world import measured
 from surgsim.tick.status import GOES_ON
 
 DT = 0.001

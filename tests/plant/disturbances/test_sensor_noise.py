@@ -6,7 +6,7 @@ from scipy.signal import lfilter
 
 from surgsim.errors import ScenarioError
 from surgsim.plant.disturbances.sensor_noise import SensorNoiseConfig
-from surgsim.plant.world import BLOCK_TICKS
+from surgsim.plant.part import BLOCK_TICKS
 
 QUIET = dict(
     position_std_rad=0.0, velocity_std_rad_per_s=0.0, torque_std_nm=0.0, port_std_m=0.0, tip_force_std_n=0.0
