@@ -57,6 +57,7 @@ ONLY = {
         "surgsim.models",
         "surgsim.teleop",
         "surgsim.tick.mujoco_calls",
+        "surgsim.runs.bench",
         "surgsim.plant",
         "surgsim.recording",
         "surgsim.simulate",

@@ -19,6 +19,7 @@ from surgsim.simulate.setup import prepare
 
 _SCENARIO = "circle_lwr4plus"
 _CHUNK = 256
+MOST_S = 3600.0
 _NEEDS = {"rcm_interaction_force": ("trocar.wall={}",)}
 """What a controller needs in the scenario to be run at all."""
 OTHERS = ("theatre_lwr4plus", "teleop_free_motion_panda")
@@ -33,10 +34,12 @@ def bench(duration_s: float, repeat: int) -> list[dict[str, Any]]:
         repeat: Runs of each; the chunks of all count.
 
     Raises:
-        SurgsimError: If the duration or count is not positive.
+        SurgsimError: If the duration is not from 1 s to an hour, or the count is not positive.
     """
-    if not (duration_s >= 1.0 and repeat >= 1):
-        raise SurgsimError("bench needs a duration of at least 1 s and at least one repeat")
+    if not (1.0 <= duration_s <= MOST_S and repeat >= 1):
+        raise SurgsimError(
+            f"bench needs a duration of at least 1 s and at most {MOST_S:g} s, and at least one repeat"
+        )
     rows = [_row(f"circle, {name}", _circle(name), duration_s, repeat) for name in shipped("controllers")]
     return [*rows, *(_row(name, load_scenario(name), duration_s, repeat) for name in OTHERS)]
 
