@@ -27,8 +27,8 @@ Nominal means that the controller's model of the arm is exact. The paper's arm w
 and payload that its model did not have, so the second level adds both: {level}, a cell at the edge of those
 of the ladder below that stay within 5 mm and 15 mm, where VPRNN's errors are of the size of the paper's
 figures. `mu over attainable` is the mean of µ/µ*, with µ* the largest µ that self-motion
-could reach at the same tip and trocar
-positions. It is that of a shaft through the trocar: a run with an RCM error can pass it."""
+could reach with the same tip and the
+shaft through the same point, where it passes the trocar, so that a run cannot pass it."""
 
 GAINS = """## Gains: why the three are nearly alike
 
