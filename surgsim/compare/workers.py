@@ -16,7 +16,7 @@ from surgsim.compare.job import CRASHED, WORKER_DIED, DiskError, Job, attempt, w
 from surgsim.compiling import Compiling, listening, tell
 from surgsim.errors import SurgsimError
 from surgsim.runs.drafts import clear_drafts
-from surgsim.runs.stop import held_back, obey_parent
+from surgsim.runs.stop import held_back, leave_in_peace, obey_parent
 
 TRIES = 2
 _MOST_STILLBORN = 5
@@ -204,13 +204,14 @@ def _serve(pipe: Connection) -> None:
         try:
             job = pipe.recv()
         except (EOFError, OSError):
-            return
+            break
         try:
             with listening(forward):
                 answer = attempt(job)
             pipe.send(answer)
         except OSError:
-            return
+            break
+    leave_in_peace()
 
 
 def _die_with_parent() -> None:

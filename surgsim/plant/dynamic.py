@@ -13,6 +13,7 @@ from surgsim.catalog import PartConfig
 from surgsim.columns import Block, scalar
 from surgsim.columns import vector as vector_columns
 from surgsim.compiled import as_parameter, compiled
+from surgsim.errors import SurgsimError
 from surgsim.models.build import Scene
 from surgsim.plant.bore import Bore, act, drag, wall_force
 from surgsim.plant.bystanders import joint_columns
@@ -89,7 +90,7 @@ def clear_forces(world: World, bore: Bore, hooks: Hooks, functions: tuple[Kernel
         place = vector(world.mocap_pos + 24 * world.mocap, 3)
         for i in range(3):
             place[i] = world.port_home[i] + world.port_offset[i]
-    if world.walled:
+    if world.walled and status == GOES_ON:
         drag(bore, world)
     return status
 
@@ -126,37 +127,52 @@ def see_arm(world: World) -> None:
 def begin(world: World, bore: Bore, hooks: Hooks, functions: tuple[Kernel, ...]) -> int:
     """The first instant of a run: the arm at rest is held by the torques that it needs."""
     status = clear_forces(world, bore, hooks, functions, 0.0)
+    if status != GOES_ON:
+        return status
     mj_step1(world.mj_model, world.mj_data)
     gravity = vector(world.qfrc_bias, world.nv)
     for i in range(world.q.size):
         world.tau[i] = gravity[world.first_dof + i]
-    return max(status, look(world, bore, hooks, functions))
+    return look(world, bore, hooks, functions)
 
 
 @compiled
 def advance_dynamics(world: World, bore: Bore, hooks: Hooks, functions: tuple[Kernel, ...]) -> int:
-    """Let `world.torque`, saturated at the limits, act for one control period."""
+    """Let `world.torque`, saturated at the limits, act for one control period.
+
+    A hook that does not go on ends it there: nothing further is stepped or called.
+    """
     m, d, ctrl = world.mj_model, world.mj_data, vector(world.ctrl, world.first_ctrl + world.q.size)
     for i in range(world.q.size):
         world.torque[i] = min(max(world.torque[i], -world.tau_max[i]), world.tau_max[i])
     status = call_hooks(ACTUATE, functions, hooks, world)
     if status == GOES_ON:
         status = call_hooks(GRIP, functions, hooks, world)
+    if status != GOES_ON:
+        return status
     for i in range(world.q.size):
         world.tau[i] = ctrl[world.first_ctrl + i] = world.torque[i]
     start = world.tick * world.dt_s
     for k in range(world.substeps):
         t = start + k * world.timestep_s
         if k > 0:
-            status = max(status, clear_forces(world, bore, hooks, functions, t))
+            status = clear_forces(world, bore, hooks, functions, t)
+            if status != GOES_ON:
+                return status
             mj_step1(m, d)
         world.step_s = t
-        status = max(status, call_hooks(PUSH, functions, hooks, world))
+        status = call_hooks(PUSH, functions, hooks, world)
+        if status != GOES_ON:
+            return status
         if world.walled:
             act(bore, world)
-        status = max(status, call_hooks(BEFORE_STEP, functions, hooks, world))
+        status = call_hooks(BEFORE_STEP, functions, hooks, world)
+        if status != GOES_ON:
+            return status
         mj_step2(m, d)
-        status = max(status, call_hooks(AFTER_STEP, functions, hooks, world))
+        status = call_hooks(AFTER_STEP, functions, hooks, world)
+        if status != GOES_ON:
+            return status
     if world.touched and world.jaws >= 0:
         mj_rnePostConstraint(m, d)
         wrench = doubles(world.cfrc_ext, world.nbody, 6)[world.jaws]
@@ -164,9 +180,11 @@ def advance_dynamics(world: World, bore: Bore, hooks: Hooks, functions: tuple[Ke
             world.f_T[i] = wrench[3 + i]
     world.tick += 1
     world.t_s = world.tick * world.dt_s
-    status = max(status, clear_forces(world, bore, hooks, functions, world.t_s))
+    status = clear_forces(world, bore, hooks, functions, world.t_s)
+    if status != GOES_ON:
+        return status
     mj_step1(m, d)
-    return max(status, look(world, bore, hooks, functions))
+    return look(world, bore, hooks, functions)
 
 
 @compiled
@@ -226,7 +244,7 @@ class DynamicPlant:
         self._ledger = EnergyLedger(scene, self._data, self._port) if energy_ledger else None
         for part in self._parts:
             part.attach(scene, control_period_s)
-        self._drawn_at = -1
+        self._drawn_at = np.full(1, -1.0)
         self._joint_columns, places = joint_columns(scene.model)
         self._table = self._hooks(places)
         self._points = PointReader(scene, self._data)
@@ -242,6 +260,17 @@ class DynamicPlant:
         """What of the plant is a Python object with a state, by name."""
         parts = {f"{type(part).__name__} ({k})": part for k, part in enumerate(self._parts)}
         return {**parts, "energy ledger": self._ledger}
+
+    @property
+    def arrays(self) -> dict[str, Any]:
+        """The rest of its state, by name: the parts' arrays, and what the jaws change in the model."""
+        model = self._scene.model
+        return {
+            **self._table.state,
+            "drawn_at": self._drawn_at,
+            "welds": model.eq_data,
+            "contact bits": model.geom_conaffinity,
+        }
 
     @property
     def parts(self) -> tuple[PlantPart, ...]:
@@ -271,8 +300,9 @@ class DynamicPlant:
     def _hooks(self, places: NDArray[np.intp]) -> HookTable:
         """Own columns, the ledger and all parts, in this order."""
         own = 3 * (self._scene.wall is not None) + 3 * self._touched + len(places)
-        none = np.zeros(0)
-        arrays = [(places.astype(float), none, own), (none, none, 0 if self._ledger is None else 10)]
+        columns = PlantPart()
+        columns.gains = places.astype(float)
+        shares = [(columns, own), (PlantPart(), 0 if self._ledger is None else len(EnergyLedger.COLUMNS))]
         hooks = [Hook(kind=VALUES, part=0, rank=0, kernel=_own_values)]
         if self._ledger is not None:
             hooks += [
@@ -282,9 +312,9 @@ class DynamicPlant:
             ]
         for number, part in enumerate(self._parts, _FIRST_PART):
             width = sum(len(block.columns) for block in part.columns) if _records(part) else 0
-            arrays.append((part.gains, part.memory, width))
+            shares.append((part, width))
             hooks += self._hooks_of(part, number)
-        return HookTable(hooks, arrays, len(self._scene.dof_ids), self.world)
+        return HookTable(hooks, shares, len(self._scene.dof_ids), self.world)
 
     def _hooks_of(self, part: PlantPart, number: int) -> list[Hook]:
         found = []
@@ -317,7 +347,7 @@ class DynamicPlant:
         world.tick, world.t_s = 0, 0.0
         world.f_T[:] = 0.0
         self._start_parts()
-        self._drawn_at = -1
+        self._drawn_at[:] = -1.0
         self.refill()
         self._port.reset()
         if self._ledger is not None:
@@ -360,8 +390,8 @@ class DynamicPlant:
     def refill(self) -> None:
         """Let the parts draw what they need for the coming ticks; to be called every `BLOCK_TICKS`."""
         tick = int(self.world.tick)
-        if tick % BLOCK_TICKS == 0 and tick != self._drawn_at:
-            self._drawn_at = tick
+        if tick % BLOCK_TICKS == 0 and tick != self._drawn_at[0]:
+            self._drawn_at[0] = tick
             for number, part in enumerate(self._parts, _FIRST_PART):
                 part.refill(self._table.memory_of(number))
 
@@ -386,11 +416,9 @@ class DynamicPlant:
         )
 
     def _told(self, status: int) -> None:
-        """Raise what a part in Python raised."""
+        """Raise what a part in Python raised, or say that a kernel gave a status."""
         if status != GOES_ON:
-            error = self._table.raised()
-            assert error is not None, f"a part of the plant stopped with status {status}"
-            raise error
+            raise self._table.raised() or SurgsimError(f"a disturbance or prop told status {status}")
 
 
 def _records(part: PlantPart) -> bool:

@@ -95,6 +95,11 @@ class KinematicPlant:
         """What of the plant is a Python object with a state: nothing."""
         return {}
 
+    @property
+    def arrays(self) -> dict[str, Any]:
+        """The rest of its state: nothing."""
+        return {}
+
     def reset(self, q: Array) -> State:
         """Put the arm at rest at joint positions `q` (n,) [rad]."""
         mujoco.mj_resetData(self._scene.model, self._data)

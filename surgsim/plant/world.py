@@ -117,7 +117,7 @@ class HookTable:
 
     Args:
         hooks: The hooks.
-        parts: What gives the parts' arrays: `gains`, `memory` and the width of its columns.
+        parts: Whose `gains` and `memory` they work on, and how many columns each has.
         joints: Number of the arm's joints.
         world: The plant's record, for kernels that are plain Python.
 
@@ -130,20 +130,19 @@ class HookTable:
     """
 
     def __init__(
-        self, hooks: Sequence[Hook], parts: Sequence[tuple[Array, Array, int]], joints: int, world: Any = None
+        self, hooks: Sequence[Hook], parts: Sequence[tuple[PlantPart, int]], joints: int, world: Any = None
     ) -> None:
         if len(hooks) > SLOTS:
-            raise SurgsimError(f"disturbances and props have {len(hooks)} hooks; at most {SLOTS} are allowed")
-        ends = np.cumsum([[0, 0, 0]] + [[len(g), len(m), w] for g, m, w in parts], axis=0)
+            raise SurgsimError(f"plant, disturbances and props have {len(hooks)} hooks; at most {SLOTS} fit")
+        ends = np.cumsum([[0, 0, 0]] + [[len(p.gains), len(p.memory), w] for p, w in parts], axis=0)
         count = len(hooks)
         self._ends = ends
         order, counts = np.zeros((len(KINDS), SLOTS), dtype=np.int64), np.zeros(len(KINDS), dtype=np.int64)
         places = np.zeros((SLOTS, 6), dtype=np.int64)
-        entered = [PythonPart(self._call(slot, h)) for slot, h in enumerate(hooks) if _in_python(h)]
+        entered = [PythonPart(self._call(hook)) for hook in hooks if _in_python(hook)]
         self._entered, self._world = entered, world
         addresses = np.concatenate([np.zeros(0), *(part.gains for part in entered)])
-        self._memories = [m for _, m, _ in parts]
-        self._gains = [g for g, _, _ in parts]
+        self._parts = [part for part, _ in parts]
         self.arrays = Hooks(
             order=order,
             counts=counts,
@@ -153,7 +152,6 @@ class HookTable:
             values=np.zeros(int(ends[-1, 2])),
         )
         self._first_address = int(ends[-1, 0])
-        self._own_gains = self.arrays.gains[: self._first_address]
         self._addresses = addresses
         functions: list[Any] = []
         for slot, hook in enumerate(hooks):
@@ -172,26 +170,37 @@ class HookTable:
         functions += [python_kernel] * (SLOTS - count)
         self.functions = tuple(as_parameter(function, hook_signature(joints)) for function in functions)
 
-    def _call(self, slot: int, hook: Hook) -> Callable[[], int | None]:
+    def _call(self, hook: Hook) -> Callable[[], int | None]:
         """What enters a hook in Python; a kernel in plain Python is given its part's slices."""
         if hook.call is not None:
             return hook.call
 
         def call() -> int:
             a, kernel = self.arrays, hook.kernel
-            first = self._ends[hook.part], self._ends[hook.part + 1]
+            begins, ends = self._ends[hook.part], self._ends[hook.part + 1]
             gains, memory, values = (
-                array[first[0][k] : first[1][k]] for k, array in enumerate((a.gains, a.memory, a.values))
+                array[begins[k] : ends[k]] for k, array in enumerate((a.gains, a.memory, a.values))
             )
             return int(kernel(gains, self._world, memory, values))
 
         return call
 
     def fill(self) -> None:
-        """Take over the parts' gains and memories, as they are after their start."""
-        if self._gains:
-            self.arrays.gains[: self._first_address] = np.concatenate([np.zeros(0), *self._gains])
-            self.arrays.memory[:] = np.concatenate([np.zeros(0), *self._memories])
+        """Take over the parts' gains and memories, as they are after their start.
+
+        Raises:
+            SurgsimError: If a part has changed their size since it was attached.
+        """
+        for k, part in enumerate(self._parts):
+            for name, array, column in (("gains", self.arrays.gains, 0), ("memory", self.arrays.memory, 1)):
+                first, end = self._ends[k, column], self._ends[k + 1, column]
+                given = getattr(part, name)
+                if given.shape != (end - first,):
+                    raise SurgsimError(
+                        f"{type(part).__name__}: {name} had {end - first} numbers when it was attached, "
+                        f"and has the shape {given.shape} after its start"
+                    )
+                array[first:end] = given
         self.arrays.gains[self._first_address :] = self._addresses
 
     @property

@@ -68,6 +68,11 @@ def obey_parent() -> None:
     signal.signal(signal.SIGTERM, _leave)
 
 
+def leave_in_peace() -> None:
+    """In a worker process that is about to end: SIGTERM no longer disturbs its way out."""
+    signal.signal(signal.SIGTERM, signal.SIG_IGN)
+
+
 def _leave(number: int, _: FrameType | None) -> None:
     signal.signal(number, signal.SIG_IGN)
     sys.exit(128 + number)

@@ -157,7 +157,7 @@ class Simulation:
         """Tick to the end; if that is an outcome that stops the arm, stop it and hold it for a while."""
         duration = self._setup.task.duration_s
         while not self.ended:
-            self._advance_by(BLOCK_TICKS - int(self._setup.plant.world.tick) % BLOCK_TICKS)
+            self._advance_by(self._block(BLOCK_TICKS))
             if progress is not None:
                 progress(self.time_s, duration)
         self._hold()
@@ -172,9 +172,13 @@ class Simulation:
         """Up to `ticks` control periods, as `tick` would; fewer where the run ends."""
         left = ticks
         while left > 0 and not self.ended:
-            block = min(left, BLOCK_TICKS - int(self._setup.plant.world.tick) % BLOCK_TICKS)
+            block = self._block(left)
             self._advance_by(block)
             left -= block
+
+    def _block(self, ticks: int) -> int:
+        """How many of `ticks` come before parts draw again."""
+        return min(ticks, BLOCK_TICKS - int(self._setup.plant.world.tick) % BLOCK_TICKS)
 
     def _advance_by(self, ticks: int) -> None:
         plant, controller = self._setup.plant, self._setup.controller
@@ -210,9 +214,13 @@ class Simulation:
             return Ending(outcome=Outcome.DIVERGED, t_s=t_s, detail="torque is not finite")
         if reason == DONE:
             return Ending(outcome=Outcome.COMPLETED, t_s=t_s)
-        error = self._task.raised() or self._setup.plant.hooks.raised()
-        assert error is not None, f"the loop came back with {reason} and no error"
-        raise error
+        if reason == TASK_TOLD:
+            raise self._task.raised() or self._stopped(self._setup.scenario.task.type)
+        raise self._setup.plant.hooks.raised() or self._stopped("a disturbance or prop")
+
+    def _stopped(self, who: str) -> SurgsimError:
+        """A part without an outcome of its own gave a status that does not go on."""
+        return SurgsimError(f"{who} ended the run with status {int(self._run.progress.status)}")
 
     def _hold(self) -> None:
         """The stop after the outcome: rows without a command, for its time or until the state diverges."""
@@ -222,9 +230,8 @@ class Simulation:
             return
         left = self._stop_ticks
         while left > 0:
-            ticks = min(left, BLOCK_TICKS - int(self._setup.plant.world.tick) % BLOCK_TICKS)
-            self._setup.plant.refill()
-            plant = self._setup.plant
+            ticks, plant = self._block(left), self._setup.plant
+            plant.refill()
             done = self._hold_ticks(
                 ticks,
                 self._run,
@@ -245,7 +252,9 @@ class Simulation:
     def _ask(self) -> None:
         """The task's command for the present state."""
         c, world = self._setup.controller.control, self._setup.plant.world
-        if self._ask_task(self._run, self._tables, c, world, self._task.kernel) != GOES_ON:
+        status = self._ask_task(self._run, self._tables, c, world, self._task.kernel)
+        if status != GOES_ON:
+            self._run.progress.status = status
             self._end(TASK_TOLD)
 
     def snapshot(self) -> Snapshot:
@@ -306,7 +315,7 @@ class Simulation:
 
     def _arrays(self) -> dict[str, Array]:
         setup = self._setup
-        return {**self._task.arrays, **setup.controller.arrays, **setup.plant.hooks.state}
+        return {**self._task.arrays, **setup.controller.arrays, **setup.plant.arrays}
 
     def _objects(self) -> dict[str, Any]:
         setup = self._setup

@@ -150,7 +150,10 @@ def _or_infinite(limit: float | None) -> float:
 
 @compiled
 def is_safe(guard: Guard, watch: Watch, world: World, command: Command) -> bool:
-    """Whether no limit is passed; NaN is not safe, but a force that is NaN is not there."""
+    """Whether `SafetyMonitor.check` would find nothing: a NaN in the joints is not safe, one elsewhere is.
+
+    A command of NaN ends the run as the torque that follows from it does; a force of NaN is not there.
+    """
     for i in range(world.q.size):
         q, v = world.q[i], world.v[i]
         if not (math.isfinite(q) and math.isfinite(v)):
@@ -163,9 +166,9 @@ def is_safe(guard: Guard, watch: Watch, world: World, command: Command) -> bool:
     square = 0.0
     for i in range(3):
         square += (world.p_WT[i] - command.p_WTd[i]) * (world.p_WT[i] - command.p_WTd[i])
-    if not math.sqrt(square) <= guard.tip_m:
+    if math.sqrt(square) > guard.tip_m:
         return False
-    if guard.rcm_m < math.inf and not shaft_distance(world.p_WC, world.p_WT, world.p_WR) <= guard.rcm_m:
+    if guard.rcm_m < math.inf and shaft_distance(world.p_WC, world.p_WT, world.p_WR) > guard.rcm_m:
         return False
     if norm(world.f_C) > guard.wall_n or norm(world.f_T) > guard.touch_n:
         return False

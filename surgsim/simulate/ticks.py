@@ -371,10 +371,11 @@ def run_ticks(
                 _record_torque(row, at, world.tau_max, stop.torque)
             status = _act(stop.torque, stop.qdot, c.command.jaw, world, bore, hooks, advance, functions)
         if status != GOES_ON:
-            p.reason = PLANT_TOLD
+            p.reason, p.status = PLANT_TOLD, status
             return k + 1
-        if ask_task(run, tables, c, world, task) != GOES_ON:
-            p.reason = TASK_TOLD
+        status = ask_task(run, tables, c, world, task)
+        if status != GOES_ON:
+            p.reason, p.status = TASK_TOLD, status
             return k + 1
     return ticks
 
@@ -402,7 +403,7 @@ def hold_ticks(
             _record_torque(last, at, world.tau_max, stop.torque)
         status = _act(stop.torque, stop.qdot, c.command.jaw, world, bore, hooks, advance, functions)
         if status != GOES_ON:
-            p.reason = PLANT_TOLD
+            p.reason, p.status = PLANT_TOLD, status
             return k
         row = _begin_row(p, tables.rows, at, world, hooks.values)
         row[at[STOPPED]] = 1.0

@@ -72,7 +72,15 @@ SLOW = (
     "surgsim compare frontier ",
     "surgsim compare torque_level ",
 )
+NO_PREDICTION = (
+    "surgsim run circle_lwr4plus --controller rcm_inverse_dynamics "
+    "--set controller.torque_law.rcm_stiffness_per_s2=20000 "
+    "--set controller.torque_law.tip_stiffness_per_s2=10000 --set controller.torque_law.observer_gain=0.3 "
+    "--set 'disturbances=[{type: actuation_delay, delay_s: 0.004}]' "
+    "--set controller.torque_law.most_delay_ticks=0 --out runs/no_prediction"
+)
 STATUS = {
+    NO_PREDICTION: 1,  # past the frontier: the run is stopped, as the page says
     "surgsim compare seeds --out runs/seeds --shard 1/2": 1,  # the other shard is missing
 }
 

@@ -8,11 +8,12 @@ import pytest
 
 from surgsim.errors import Outcome
 from surgsim.plant.truth import Contact, Truth
+from surgsim.scenario.load import load_scenario
 from surgsim.scenario.schema import SafetyConfig
-from surgsim.simulate.loop import simulate
+from surgsim.simulate.loop import Simulation, simulate
 from surgsim.simulate.safety import SafetyMonitor
 from surgsim.simulate.setup import prepare
-from surgsim.tasks.base import TipCommand
+from surgsim.tasks.base import TimedTask, TipCommand
 
 SAFE = SafetyConfig(rcm_error_max_m=0.01, tip_error_max_m=0.02, trocar_force_max_n=5.0, tip_force_max_n=2.0)
 TIP = np.array([0.0, 0.0, -0.2])
@@ -32,6 +33,24 @@ def _joints(**given):
 def _check(arm, config=SAFE, *, truth=TRUTH, command=COMMAND, has_trocar=True, tear=np.inf, **state):
     monitor = SafetyMonitor(config, arm.limits, has_trocar, tear)
     return monitor.check(1.5, replace(truth, **state), command)
+
+
+class Lost(TimedTask):
+    """From 0.1 s on its command is not a number."""
+
+    duration_s = 1.0
+
+    def command(self, t_s, feedback=None):
+        here = np.array([0.0, 0.65, -0.03]) if t_s < 0.1 else np.full(3, np.nan)
+        return TipCommand(p_WTd=here, v_WTd=np.zeros(3), a_WTd=np.zeros(3))
+
+
+def test_a_command_of_nan_ends_the_run_as_diverged():
+    for controller in ("pinv", "rcm_inverse_dynamics"):
+        setup = prepare(load_scenario("circle_panda", controller=controller))
+        ending = Simulation(replace(setup, task=Lost())).run().meta.ending
+        assert ending.outcome is Outcome.DIVERGED
+        assert ending.t_s == pytest.approx(0.1)
 
 
 def test_at_the_limits_nothing_happens(arm):

@@ -8,12 +8,14 @@ import pytest
 
 from surgsim.control.policies.registry import offering
 from surgsim.errors import SurgsimError
+from surgsim.plant.part import BLOCK_TICKS
 from surgsim.scenario.load import load_scenario
 from surgsim.simulate.loop import Simulation
 from surgsim.simulate.setup import prepare
 
 SHORT = ("task.duration_s=1", "task.ramp_s=0.2", "task.hold_start_s=0.1", "task.hold_end_s=0.1")
-NOISE = ("disturbances=[{type: sensor_noise}, {type: payload, spread: 0.5}]",)
+LONG = ("task.duration_s=5", "task.ramp_s=0.2", "task.hold_start_s=0.1", "task.hold_end_s=0.1")
+DRAWN = ("disturbances=[{type: sensor_noise}, {type: actuation_delay, delay_s: 0.001, jitter_s: 0.001}]",)
 CONTROLLERS = ("pinv", "gradient", "rnn", "vprnn", "qp", "passive_convex", "rcm_inverse_dynamics", "mink")
 
 
@@ -60,6 +62,17 @@ def test_everything_at_once_goes_on_with_the_same_bits(name, ticks):
     _same(_rest(fork, 100), expected)
     simulation.restore(taken)
     _same(_rest(simulation, 100), expected)
+
+
+@pytest.mark.parametrize("ticks", [0, BLOCK_TICKS - 1, BLOCK_TICKS])
+def test_what_is_drawn_in_blocks_is_drawn_again_after_a_restore(ticks):
+    scenario = load_scenario("circle_panda", controller="pinv", assignments=(*LONG, *DRAWN))
+    simulation = _begun(scenario, ticks)
+    fork, taken = simulation.fork(), simulation.snapshot()
+    expected = _rest(simulation, BLOCK_TICKS + 76)
+    _same(_rest(fork, BLOCK_TICKS + 76), expected)
+    simulation.restore(taken)
+    _same(_rest(simulation, BLOCK_TICKS + 76), expected)
 
 
 def test_a_fork_goes_its_own_way_and_leaves_the_first_alone():

@@ -200,3 +200,23 @@ def test_jaws_that_press_on_a_ring_feel_it_and_the_ring_stays_on_the_board(board
     assert trace.block("ring1")[:, 2].min() > -0.06 + 0.00125 - 2e-4
     felt = np.linalg.norm(trace.block("tip_force"), axis=1)
     np.testing.assert_allclose(felt, trace["jaws_load_n"], atol=1e-9)
+
+
+def test_a_snapshot_with_a_ring_in_the_jaws_goes_on_with_the_same_bits(board_scenario, transfer):
+    scenario = board_scenario(**ONE)
+    simulation, other = transfer(scenario), transfer(scenario)
+
+    def held():
+        return simulation.trace().block("ring_state")[-1, 0] == RingState.GRASPED
+
+    simulation.advance(50)
+    while not held():
+        simulation.advance(50)
+    taken = simulation.snapshot()
+    simulation.advance(400)
+    assert held()
+    other.restore(taken)
+    other.advance(400)
+    here, there = simulation.trace(), other.trace()
+    kept = [k for k, name in enumerate(here.columns) if name != "control_time_s"]
+    np.testing.assert_array_equal(here.data[:, kept], there.data[:, kept])
