@@ -5,6 +5,6 @@ decorator, `cache` what is kept, `identity` the key of an entry, `places` the fo
 share one compilation, and `watch` what a person is told and how long it took.
 """
 
-from surgsim.compiled.kernel import as_parameter, compiled
+from surgsim.compiled.kernel import address_of, as_parameter, call_at, compiled
 
-__all__ = ["as_parameter", "compiled"]
+__all__ = ["address_of", "as_parameter", "call_at", "compiled"]

@@ -6,9 +6,12 @@ from collections.abc import Callable
 from typing import Any, TypeVar, cast, overload
 
 import numba
+from numba import types
+from numba.core import cgutils
 from numba.core.errors import NumbaExperimentalFeatureWarning
 from numba.core.typeinfer import register_dispatcher
-from numba.extending import is_jitted
+from numba.extending import intrinsic, is_jitted
+from numba.extending import overload as overload_function
 
 from surgsim.compiled.cache import KernelCache
 from surgsim.compiled.watch import declare
@@ -52,6 +55,51 @@ def _kernel(function: Function, signatures: tuple[Any, ...]) -> Function:
                 dispatcher.compile(signature)
         dispatcher.disable_compile()
     return cast(Function, dispatcher)
+
+
+def address_of(kernel: Any, signature: Any) -> int:
+    """Where the `@compiled` function is, compiled for this signature: what `call_at` calls."""
+    parameter = as_parameter(kernel, signature)
+    if not is_jitted(parameter):
+        _IN_PYTHON[id(parameter)] = parameter
+        return id(parameter)
+    found: Any = parameter.get_compile_result(signature)
+    address: int = found.library.get_pointer_to_function(found.fndesc.llvm_func_name)
+    return address
+
+
+_IN_PYTHON: dict[int, Callable[..., int]] = {}
+
+
+@intrinsic
+def _call_address(context: Any, address: Any, values: Any) -> Any:
+    """Call what is at an address with the entries of a tuple; it returns a whole number."""
+    kinds = tuple(values)
+
+    def generate(target: Any, builder: Any, signature: Any, given: Any) -> Any:
+        result = signature.return_type
+        function = target.call_conv.get_function_type(result, kinds)
+        pointer = builder.inttoptr(given[0], function.as_pointer())
+        arguments = cgutils.unpack_tuple(builder, given[1])
+        status, out = target.call_conv.call_function(builder, pointer, result, kinds, arguments)
+        with builder.if_then(status.is_error, likely=False):
+            target.call_conv.return_status_propagate(builder, status)
+        return out
+
+    return types.int64(address, values), generate
+
+
+def call_at(address: int, *values: Any) -> int:
+    """Call the kernel at an address of `address_of`; its result is a status."""
+    return _IN_PYTHON[address](*values)
+
+
+@overload_function(call_at)
+def _call_at_in_kernels(address: Any, *values: Any) -> Any:
+    def call(address: Any, *values: Any) -> Any:
+        return _call_address(address, values)  # type: ignore[call-arg]
+
+    return call
 
 
 _AS_PARAMETERS: dict[tuple[Any, Any], Any] = {}

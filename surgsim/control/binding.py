@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba.core.dispatcher import Dispatcher
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from surgsim.columns import Block
 from surgsim.compiled import as_parameter
-from surgsim.control.decision import ESTIMATOR, LAW, SOLVER, Minds
+from surgsim.control.decision import ESTIMATOR, LAW, SOLVER
 from surgsim.control.failure import ControlFailure, failure_of
 from surgsim.control.port_estimators.base import PortEstimate, port_problem_of
 from surgsim.control.problem import Resolution
@@ -18,11 +18,23 @@ from surgsim.control.seen import fill_constants, velocity_problem_of
 from surgsim.control.torque_laws.base import torque_problem_of
 from surgsim.errors import Outcome
 from surgsim.models.arm import ArmModel
-from surgsim.tick.arrays import Control, law_signature, new, resolver_signature
+from surgsim.tick.arrays import Control, law_signature, new, point, resolver_signature
 from surgsim.tick.python_part import PythonPart, python_kernel
 from surgsim.tick.status import INFEASIBLE, RANK_LOST, TOLD
 
 Array = NDArray[np.float64]
+
+
+class PartArrays(NamedTuple):
+    """The arrays that `surgsim.tick.arrays.Minds` says the places of, by the same names."""
+
+    port_gains: Array
+    port_memory: Array
+    resolver_gains: Array
+    resolver_memory: Array
+    law_gains: Array
+    law_memory: Array
+    terms: Array
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -49,9 +61,9 @@ class ControllerParts:
         """The resolver's columns."""
         return tuple(getattr(self.resolver, "columns", ()))
 
-    def minds(self, n: int) -> Minds:
+    def arrays(self, n: int) -> PartArrays:
         """Numbers and memories of the parts, for n joints."""
-        return Minds(
+        return PartArrays(
             port_gains=_gains(self.port),
             port_memory=_memory(self.port),
             resolver_gains=_gains(self.resolver),
@@ -59,7 +71,6 @@ class ControllerParts:
             law_gains=_gains(self.law),
             law_memory=_memory(self.law),
             terms=np.zeros((len(self.terms), n)),
-            port=np.zeros((3, 3)),
         )
 
 
@@ -98,7 +109,7 @@ class Bound:
         entered: The parts that are entered in Python, by the value of `Control.who`.
         parts: The parts.
         control: The record of the tick.
-        minds: Their numbers and memories.
+        arrays: Their numbers and memories.
         remembered: What the parts that are Python objects remember, by the value of `Control.who`.
     """
 
@@ -106,7 +117,7 @@ class Bound:
     entered: dict[int, PythonPart]
     parts: ControllerParts
     control: Any
-    minds: Minds
+    arrays: PartArrays
     remembered: dict[int, Any]
 
     def failure(self, status: int) -> ControlFailure:
@@ -127,7 +138,7 @@ class Bound:
             raise error
         seen = c.referred if who == SOLVER and c.at_reference else c.seen
         if who == SOLVER and hasattr(self.parts.resolver, "failure"):
-            failure: ControlFailure = self.parts.resolver.failure(status, seen, self.minds.resolver_memory)
+            failure: ControlFailure = self.parts.resolver.failure(status, seen, self.arrays.resolver_memory)
             return failure
         if who == LAW and hasattr(self.parts.law, "failure"):
             failure = self.parts.law.failure(status, seen)
@@ -148,7 +159,9 @@ def bind(parts: ControllerParts, control: Any, arm: ArmModel) -> Bound:
     entered: dict[int, PythonPart] = {}
     remembered: dict[int, Any] = {}
     n = arm.limits.q_min.size
-    minds = parts.minds(n)
+    minds = parts.arrays(n)
+    for name, array in minds._asdict().items():
+        point(control.minds[name], array)
 
     def kernel(who: int, part: Any, gains: Array, call: Callable[[], int | None]) -> Any:
         signature = resolver_signature(n) if who == SOLVER else law_signature(n)
@@ -175,14 +188,14 @@ def bind(parts: ControllerParts, control: Any, arm: ArmModel) -> Bound:
         entered=entered,
         parts=parts,
         control=control,
-        minds=minds,
+        arrays=minds,
         remembered=remembered,
     )
 
 
-def _port_call(port: Any, c: Any, minds: Minds, remembered: dict[int, Any]) -> Callable[[], int | None]:
+def _port_call(port: Any, c: Any, minds: PartArrays, remembered: dict[int, Any]) -> Callable[[], int | None]:
     if hasattr(port, "kernel"):
-        return lambda: port.kernel(port.gains, c.seen, minds.port_memory, minds.port)
+        return lambda: port.kernel(port.gains, c.seen, minds.port_memory, c.port)
 
     def call() -> None:
         problem = port_problem_of(c.seen, has_dynamics=bool(c.has_law))
@@ -190,13 +203,13 @@ def _port_call(port: Any, c: Any, minds: Minds, remembered: dict[int, Any]) -> C
             remembered[ESTIMATOR] = port.start(problem)
         estimate: PortEstimate
         estimate, remembered[ESTIMATOR] = port.step(problem, remembered[ESTIMATOR])
-        minds.port[0], minds.port[1], minds.port[2] = estimate.p_WC, estimate.v_WC, estimate.a_WC
+        c.port[0], c.port[1], c.port[2] = estimate.p_WC, estimate.v_WC, estimate.a_WC
 
     return call
 
 
 def _resolver_call(
-    parts: ControllerParts, c: Any, minds: Minds, arm: ArmModel, remembered: dict[int, Any]
+    parts: ControllerParts, c: Any, minds: PartArrays, arm: ArmModel, remembered: dict[int, Any]
 ) -> Callable[[], int | None]:
     resolver, seen = parts.resolver, c.referred if c.at_reference else c.seen
     if hasattr(resolver, "kernel"):
@@ -218,7 +231,7 @@ def _resolver_call(
     return call
 
 
-def _law_call(law: Any, c: Any, minds: Minds, remembered: dict[int, Any]) -> Callable[[], int | None]:
+def _law_call(law: Any, c: Any, minds: PartArrays, remembered: dict[int, Any]) -> Callable[[], int | None]:
     if hasattr(law, "kernel"):
         return lambda: law.kernel(law.gains, c.seen, minds.law_memory, minds.terms)
 

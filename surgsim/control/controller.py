@@ -87,7 +87,6 @@ class Controller:
 
     Attributes:
         control: The record that `decide` works on.
-        minds: The parts' numbers and memories.
         kernels: Port estimator, resolver and torque law.
         parts: Port estimator, resolver and torque law as their configs build them.
         estimates: Whether the trocar's place is estimated rather than taken as seen.
@@ -119,7 +118,7 @@ class Controller:
             at_reference=config.evaluate_at == "reference",
         )
         self._bound = bind(self.parts, self.control, arm)
-        self.kernels, self.minds = self._bound.kernels, self._bound.minds
+        self.kernels = self._bound.kernels
         self._decide = as_parameter(decide, decide_signature(arm.limits.q_min.size))
         self.reset()
 
@@ -151,7 +150,12 @@ class Controller:
     def arrays(self) -> dict[str, Array]:
         """The parts' numbers and memories, without addresses."""
         entered = {("port_gains", "resolver_gains", "law_gains")[who] for who in self._bound.entered}
-        return {name: a for name, a in self.minds._asdict().items() if name not in entered}
+        return {name: a for name, a in self._bound.arrays._asdict().items() if name not in entered}
+
+    @property
+    def is_compiled(self) -> bool:
+        """Whether all its parts are compiled kernels."""
+        return not self._bound.entered
 
     def reset(self) -> None:
         """Forget everything: the next tick is the first."""
@@ -168,7 +172,7 @@ class Controller:
         seen.tau[:], seen.f_T[:] = state.tau, state.f_T
         seen.p_WC[:], seen.v_WC[:], seen.a_WC[:] = state.p_WC, state.v_WC, 0.0
         fill_command(self.control.command, command)
-        status = self._decide(self.control, self.minds, *self.kernels)
+        status = self._decide(self.control, *self.kernels)
         if status != GOES_ON:
             raise self.failure(status)
         return self._output()
@@ -185,7 +189,7 @@ class Controller:
         )
         return ControlOutput(
             torque=c.torque.copy(),
-            terms=self.minds.terms.copy(),
+            terms=self._bound.arrays.terms.copy(),
             resolution=resolution,
             q_ref=c.q_ref.copy(),
             values=np.concatenate((own, c.port[0])) if self.estimates else own,

@@ -1,7 +1,7 @@
 """A controller's tick as a kernel: nominal model, port estimate, resolver, torque law, joint reference."""
 
 from functools import cache
-from typing import Any, NamedTuple
+from typing import Any
 
 from numba import types
 
@@ -9,9 +9,6 @@ from surgsim.compiled import compiled
 from surgsim.control.bounds import fill_velocity_bounds
 from surgsim.control.rcm import fill_rcm
 from surgsim.tick.arrays import (
-    A1,
-    A2,
-    Array,
     Control,
     Kernel,
     Seen,
@@ -21,36 +18,10 @@ from surgsim.tick.arrays import (
 )
 from surgsim.tick.nominal import copy_model, dynamics, kinematics
 from surgsim.tick.status import GOES_ON
+from surgsim.tick.views import doubles, numbers
 
 ESTIMATOR, SOLVER, LAW = range(3)
 """Values of `Control.who`."""
-
-
-class Minds(NamedTuple):
-    """Numbers and memories of a controller's parts, and the terms of its torque.
-
-    Attributes:
-        port_gains: Of the port estimator.
-        port_memory: Of the port estimator.
-        resolver_gains: Of the resolver.
-        resolver_memory: Of the resolver.
-        law_gains: Of the torque law.
-        law_memory: Of the torque law.
-        terms: Terms of the torque (k, n) [N m].
-        port: Where the port estimator's answer goes (3, 3).
-    """
-
-    port_gains: Array
-    port_memory: Array
-    resolver_gains: Array
-    resolver_memory: Array
-    law_gains: Array
-    law_memory: Array
-    terms: Array
-    port: Array
-
-
-MINDS = types.NamedTuple([A1, A1, A1, A1, A1, A1, A2, A2], Minds)  # type: ignore[no-untyped-call]
 
 
 @cache
@@ -62,32 +33,35 @@ def part_types(n: int) -> tuple[Any, Any, Any]:
 
 @cache
 def decide_signature(n: int) -> Any:
-    """Status = decide(control, minds, estimator, resolver, law)."""
-    return types.int64(type_of(Control, n), MINDS, *part_types(n))
+    """Status = decide(control, estimator, resolver, law)."""
+    return types.int64(type_of(Control, n), *part_types(n))
 
 
 @compiled
-def decide(c: Control, minds: Minds, estimator: Kernel, resolver: Kernel, law: Kernel) -> int:
+def decide(c: Control, estimator: Kernel, resolver: Kernel, law: Kernel) -> int:
     """Fill the answers in `c` from the measured state and the command in it."""
-    seen = c.seen
-    _refer(c, minds)
+    seen, minds = c.seen, c.minds
+    _refer(c)
     kinematics(c.measured, seen.q)
     if c.has_law:
         dynamics(c.measured, seen.v)
     c.measured.v[:] = seen.v
     copy_model(c.measured, seen)
     c.who = ESTIMATOR
-    status = estimator(minds.port_gains, seen, minds.port_memory, minds.port)
+    port = doubles(c.port.ctypes.data, 3, 3)
+    status = estimator(numbers(minds.port_gains), seen, numbers(minds.port_memory), port)
     if status != GOES_ON:
         return status
-    _see_port(c, minds)
+    _see_port(c)
     _see_command(c)
     c.who = SOLVER
     if c.at_reference:
-        status = resolver(minds.resolver_gains, _referred(c), minds.resolver_memory, c.resolved)
+        status = resolver(
+            numbers(minds.resolver_gains), _referred(c), numbers(minds.resolver_memory), c.resolved
+        )
     else:
         _bound(seen)
-        status = resolver(minds.resolver_gains, seen, minds.resolver_memory, c.resolved)
+        status = resolver(numbers(minds.resolver_gains), seen, numbers(minds.resolver_memory), c.resolved)
     if status != GOES_ON:
         return status
     c.torque[:] = 0.0
@@ -97,26 +71,28 @@ def decide(c: Control, minds: Minds, estimator: Kernel, resolver: Kernel, law: K
         seen.p_WTd[:] = c.resolved.p_WTd
         seen.v_WTd[:] = c.resolved.v_WTd
         seen.a_WTd[:] = c.resolved.a_WTd
-        status = law(minds.law_gains, seen, minds.law_memory, minds.terms)
+        n = c.torque.size
+        terms = doubles(minds.terms.address, minds.terms.size // n, n)
+        status = law(numbers(minds.law_gains), seen, numbers(minds.law_memory), terms)
         if status != GOES_ON:
             return status
-        for i in range(minds.terms.shape[0]):
-            for j in range(c.torque.size):
-                c.torque[j] += minds.terms[i, j]
+        for i in range(terms.shape[0]):
+            for j in range(n):
+                c.torque[j] += terms[i, j]
     seen.first = 0
     return GOES_ON
 
 
 @compiled
-def _refer(c: Control, minds: Minds) -> None:
+def _refer(c: Control) -> None:
     """The joint reference of this tick: moved by the resolver's last answer, inside the range."""
     seen = c.seen
     if seen.first:
         seen.q_ref[:] = seen.q
         seen.qdot_ref[:] = seen.v
-        minds.port_memory[:] = 0.0
-        minds.resolver_memory[:] = 0.0
-        minds.law_memory[:] = 0.0
+        numbers(c.minds.port_memory)[:] = 0.0
+        numbers(c.minds.resolver_memory)[:] = 0.0
+        numbers(c.minds.law_memory)[:] = 0.0
     else:
         for i in range(seen.q.size):
             moved = seen.q_ref[i] + seen.dt_s * c.resolved.qdot[i]
@@ -126,12 +102,10 @@ def _refer(c: Control, minds: Minds) -> None:
 
 
 @compiled
-def _see_port(c: Control, minds: Minds) -> None:
+def _see_port(c: Control) -> None:
     """Estimate and shift of the remote centre, and the RCM's kinematics."""
-    seen, port = c.seen, minds.port
+    seen, port = c.seen, c.port
     for i in range(3):
-        for k in range(3):
-            c.port[i, k] = port[i, k]
         seen.p_WC[i] = port[0, i] + c.command.rcm_shift[i]
         seen.v_WC[i] = port[1, i] + c.command.rcm_shift_rate[i]
         seen.a_WC[i] = port[2, i]

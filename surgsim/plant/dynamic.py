@@ -43,7 +43,7 @@ from surgsim.plant.world import (
     measured,
     overrides,
 )
-from surgsim.tick.arrays import Kernel, World
+from surgsim.tick.arrays import World
 from surgsim.tick.mujoco_calls import mj_rnePostConstraint, mj_step1, mj_step2
 from surgsim.tick.status import GOES_ON
 from surgsim.tick.views import doubles, site_place, vector
@@ -76,7 +76,7 @@ class DynamicPlantConfig(PartConfig):
 
 
 @compiled
-def clear_forces(world: World, bore: Bore, hooks: Hooks, functions: tuple[Kernel, ...], t_s: float) -> int:
+def clear_forces(world: World, bore: Bore, hooks: Hooks, t_s: float) -> int:
     """Forces of the last step are forgotten, the port is moved to where it is at `t_s` [s]."""
     world.step_s = t_s
     if not world.disturbed:
@@ -85,7 +85,7 @@ def clear_forces(world: World, bore: Bore, hooks: Hooks, functions: tuple[Kernel
     vector(world.qfrc_applied, world.nv)[:] = 0.0
     world.port_offset[:] = 0.0
     world.port_velocity[:] = 0.0
-    status = call_hooks(PORT_MOTION, functions, hooks, world)
+    status = call_hooks(PORT_MOTION, hooks, world)
     if world.mocap >= 0:
         place = vector(world.mocap_pos + 24 * world.mocap, 3)
         for i in range(3):
@@ -96,7 +96,7 @@ def clear_forces(world: World, bore: Bore, hooks: Hooks, functions: tuple[Kernel
 
 
 @compiled
-def look(world: World, bore: Bore, hooks: Hooks, functions: tuple[Kernel, ...]) -> int:
+def look(world: World, bore: Bore, hooks: Hooks) -> int:
     """Fill what is true and what is measured, after `mj_step1`."""
     see_arm(world)
     for i in range(3):
@@ -105,8 +105,8 @@ def look(world: World, bore: Bore, hooks: Hooks, functions: tuple[Kernel, ...]) 
         wall_force(bore, world, world.f_C)
     for i in range(world.q.size):
         world.tau_m[i] = world.tau[i]
-    status = call_hooks(VALUES, functions, hooks, world)
-    return status if status != GOES_ON else call_hooks(SENSE, functions, hooks, world)
+    status = call_hooks(VALUES, hooks, world)
+    return status if status != GOES_ON else call_hooks(SENSE, hooks, world)
 
 
 @compiled
@@ -124,20 +124,20 @@ def see_arm(world: World) -> None:
 
 
 @compiled
-def begin(world: World, bore: Bore, hooks: Hooks, functions: tuple[Kernel, ...]) -> int:
+def begin(world: World, bore: Bore, hooks: Hooks) -> int:
     """The first instant of a run: the arm at rest is held by the torques that it needs."""
-    status = clear_forces(world, bore, hooks, functions, 0.0)
+    status = clear_forces(world, bore, hooks, 0.0)
     if status != GOES_ON:
         return status
     mj_step1(world.mj_model, world.mj_data)
     gravity = vector(world.qfrc_bias, world.nv)
     for i in range(world.q.size):
         world.tau[i] = gravity[world.first_dof + i]
-    return look(world, bore, hooks, functions)
+    return look(world, bore, hooks)
 
 
 @compiled
-def advance_dynamics(world: World, bore: Bore, hooks: Hooks, functions: tuple[Kernel, ...]) -> int:
+def advance_dynamics(world: World, bore: Bore, hooks: Hooks) -> int:
     """Let `world.torque`, saturated at the limits, act for one control period.
 
     A hook that does not go on ends it there: nothing further is stepped or called.
@@ -145,9 +145,9 @@ def advance_dynamics(world: World, bore: Bore, hooks: Hooks, functions: tuple[Ke
     m, d, ctrl = world.mj_model, world.mj_data, vector(world.ctrl, world.first_ctrl + world.q.size)
     for i in range(world.q.size):
         world.torque[i] = min(max(world.torque[i], -world.tau_max[i]), world.tau_max[i])
-    status = call_hooks(ACTUATE, functions, hooks, world)
+    status = call_hooks(ACTUATE, hooks, world)
     if status == GOES_ON:
-        status = call_hooks(GRIP, functions, hooks, world)
+        status = call_hooks(GRIP, hooks, world)
     if status != GOES_ON:
         return status
     for i in range(world.q.size):
@@ -156,21 +156,21 @@ def advance_dynamics(world: World, bore: Bore, hooks: Hooks, functions: tuple[Ke
     for k in range(world.substeps):
         t = start + k * world.timestep_s
         if k > 0:
-            status = clear_forces(world, bore, hooks, functions, t)
+            status = clear_forces(world, bore, hooks, t)
             if status != GOES_ON:
                 return status
             mj_step1(m, d)
         world.step_s = t
-        status = call_hooks(PUSH, functions, hooks, world)
+        status = call_hooks(PUSH, hooks, world)
         if status != GOES_ON:
             return status
         if world.walled:
             act(bore, world)
-        status = call_hooks(BEFORE_STEP, functions, hooks, world)
+        status = call_hooks(BEFORE_STEP, hooks, world)
         if status != GOES_ON:
             return status
         mj_step2(m, d)
-        status = call_hooks(AFTER_STEP, functions, hooks, world)
+        status = call_hooks(AFTER_STEP, hooks, world)
         if status != GOES_ON:
             return status
     if world.touched and world.jaws >= 0:
@@ -180,11 +180,11 @@ def advance_dynamics(world: World, bore: Bore, hooks: Hooks, functions: tuple[Ke
             world.f_T[i] = wrench[3 + i]
     world.tick += 1
     world.t_s = world.tick * world.dt_s
-    status = clear_forces(world, bore, hooks, functions, world.t_s)
+    status = clear_forces(world, bore, hooks, world.t_s)
     if status != GOES_ON:
         return status
     mj_step1(m, d)
-    return look(world, bore, hooks, functions)
+    return look(world, bore, hooks)
 
 
 @compiled
@@ -352,7 +352,7 @@ class DynamicPlant:
         self._port.reset()
         if self._ledger is not None:
             self._ledger.start()
-        self._told(self._begin(world, self.bore, self._table.arrays, self._table.functions))
+        self._told(self._begin(world, self.bore, self._table.record))
         return self.state()
 
     def set_velocity(self, v: Array) -> State:
@@ -363,8 +363,7 @@ class DynamicPlant:
     def see(self) -> State:
         """Look again, after MuJoCo's data were changed from outside."""
         mujoco.mj_step1(self._scene.model, self._data)
-        table = self._table
-        self._told(self._look(self.world, self.bore, table.arrays, table.functions))
+        self._told(self._look(self.world, self.bore, self._table.record))
         return self.state()
 
     def _start_parts(self) -> None:
@@ -384,7 +383,7 @@ class DynamicPlant:
         """
         self.world.torque[:], self.world.qdot[:], self.world.jaw = torque, qdot, jaw
         self.refill()
-        self._told(self.advance(self.world, self.bore, self._table.arrays, self._table.functions))
+        self._told(self.advance(self.world, self.bore, self._table.record))
         return self.state()
 
     def refill(self) -> None:
@@ -412,7 +411,7 @@ class DynamicPlant:
             f_C=world.f_C.copy() if self._scene.wall is not None else NOWHERE,
             f_T=world.f_T.copy() if self._touched else NOWHERE,
             contact=self._contacts.look(p_WC),
-            values=self._table.arrays.values.copy(),
+            values=self._table.values.copy(),
         )
 
     def _told(self, status: int) -> None:

@@ -19,7 +19,7 @@ from surgsim.plant.records import world_of
 from surgsim.plant.state import State
 from surgsim.plant.truth import PointReader, Truth
 from surgsim.plant.world import Hooks, HookTable, advance_signature, measured
-from surgsim.tick.arrays import Kernel, World, new
+from surgsim.tick.arrays import World, new
 from surgsim.tick.mujoco_calls import mj_kinematics
 from surgsim.tick.status import GOES_ON
 from surgsim.tick.views import vector
@@ -52,7 +52,7 @@ def look_at_kinematics(world: World) -> None:
 
 
 @compiled
-def advance_kinematics(world: World, bore: Bore, hooks: Hooks, functions: tuple[Kernel, ...]) -> int:
+def advance_kinematics(world: World, bore: Bore, hooks: Hooks) -> int:
     """q(k+1) = q(k) + T q'(k), eq. (5) of the manipulability paper; torque and jaws do nothing."""
     qpos, qvel = vector(world.qpos, world.nq), vector(world.qvel, world.nv)
     world.tick += 1
@@ -111,7 +111,7 @@ class KinematicPlant:
     def step(self, torque: Array, qdot: Array, jaw: float = 0.0) -> State:
         """Move with velocity `qdot` (n,) [rad/s] for one control period; torque and jaws do nothing."""
         self.world.qdot[:] = qdot
-        self.advance(self.world, self.bore, self.hooks.arrays, self.hooks.functions)
+        self.advance(self.world, self.bore, self.hooks.record)
         return self.state()
 
     def refill(self) -> None:

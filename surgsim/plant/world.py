@@ -3,7 +3,7 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache
-from typing import Any, NamedTuple
+from typing import Any, ClassVar
 
 import mujoco
 import numba
@@ -12,69 +12,55 @@ from numba import types
 from numba.extending import is_jitted
 from numpy.typing import NDArray
 
-from surgsim.compiled import as_parameter, compiled
+from surgsim.compiled import address_of, call_at, compiled
 from surgsim.errors import SurgsimError
 from surgsim.models.build import Scene
 from surgsim.plant.bore import Bore
 from surgsim.plant.part import PlantPart
 from surgsim.plant.state import State
-from surgsim.tick.arrays import A1, I1, I2, Kernel, World, hook_signature, type_of
+from surgsim.tick.arrays import Numbers, Record, World, hook_signature, new, point, type_of
 from surgsim.tick.python_part import PythonPart, python_kernel
 from surgsim.tick.status import GOES_ON
+from surgsim.tick.views import integers, vector
 
 Array = NDArray[np.float64]
-Ids = NDArray[np.int64]
 
 KINDS = ("actuate", "grip", "port_motion", "push", "before_step", "after_step", "sense", "values")
 ACTUATE, GRIP, PORT_MOTION, PUSH, BEFORE_STEP, AFTER_STEP, SENSE, VALUES = range(len(KINDS))
 """Kinds of hooks, in the order of a tick."""
 SLOTS = 32
+_ENTRY = 7
 
 
-@cache
-def function_types(n: int) -> Any:
-    """Type of the hooks' kernels as one parameter, for n joints."""
-    return types.UniTuple(types.FunctionType(hook_signature(n)), SLOTS)  # type: ignore[no-untyped-call]
-
-
-class Hooks(NamedTuple):
+class Hooks(Record):
     """Which hooks are called when, on what.
 
     Attributes:
-        order: For each kind the slots to be called, in turn (kinds, SLOTS).
-        counts: How many of them (kinds,).
-        places: For each slot, where its part's gains, memory and columns begin and end (SLOTS, 6).
-        gains: Of all parts.
-        memory: Of all parts.
+        table: Address of the hooks of each kind in turn: address of the kernel, addresses and sizes of its
+            part's gains, memory and columns (kinds, SLOTS, 7).
+        counts: Address of how many there are of each kind (kinds,).
         values: The plant's own columns.
     """
 
-    order: Ids
-    counts: Ids
-    places: Ids
-    gains: Array
-    memory: Array
-    values: Array
-
-
-HOOKS = types.NamedTuple([I2, I1, I2, A1, A1, A1], Hooks)  # type: ignore[no-untyped-call]
+    ADDRESSES: ClassVar[frozenset[str]] = frozenset(("table", "counts"))
+    table: int
+    counts: int
+    values: Numbers
 
 
 @cache
 def advance_signature(n: int) -> Any:
-    """Status = advance(world, bore, hooks, functions): one control period of a plant with n joints."""
-    return types.int64(type_of(World, n), type_of(Bore, n), HOOKS, function_types(n))
+    """Status = advance(world, bore, hooks): one control period of a plant with n joints."""
+    return types.int64(type_of(World, n), type_of(Bore, n), type_of(Hooks, 0))
 
 
 @compiled
-def call_hooks(kind: int, functions: tuple[Kernel, ...], hooks: Hooks, world: World) -> int:
+def call_hooks(kind: int, hooks: Hooks, world: World) -> int:
     """Call all hooks of a kind; the first status that does not go on."""
-    for i in range(hooks.counts[kind]):
-        slot = hooks.order[kind, i]
-        at = hooks.places[slot]
-        status: int = functions[slot](
-            hooks.gains[at[0] : at[1]], world, hooks.memory[at[2] : at[3]], hooks.values[at[4] : at[5]]
-        )
+    for i in range(integers(hooks.counts + 8 * kind, 1)[0]):
+        at = integers(hooks.table + 8 * _ENTRY * (SLOTS * kind + i), _ENTRY)
+        gains, memory, out = vector(at[1], at[2]), vector(at[3], at[4]), vector(at[5], at[6])
+        status: int = call_at(at[0], gains, world, memory, out)
         if status != GOES_ON:
             return status
     return GOES_ON
@@ -122,8 +108,8 @@ class HookTable:
         world: The plant's record, for kernels that are plain Python.
 
     Attributes:
-        functions: The kernels, one in each slot.
-        arrays: What they work on.
+        record: What `call_hooks` works on.
+        values: The plant's own columns.
 
     Raises:
         SurgsimError: If there are more hooks than slots.
@@ -134,56 +120,46 @@ class HookTable:
     ) -> None:
         if len(hooks) > SLOTS:
             raise SurgsimError(f"plant, disturbances and props have {len(hooks)} hooks; at most {SLOTS} fit")
+        self._parts, self._world = [part for part, _ in parts], world
         ends = np.cumsum([[0, 0, 0]] + [[len(p.gains), len(p.memory), w] for p, w in parts], axis=0)
-        count = len(hooks)
-        self._ends = ends
-        order, counts = np.zeros((len(KINDS), SLOTS), dtype=np.int64), np.zeros(len(KINDS), dtype=np.int64)
-        places = np.zeros((SLOTS, 6), dtype=np.int64)
-        entered = [PythonPart(self._call(hook)) for hook in hooks if _in_python(hook)]
-        self._entered, self._world = entered, world
-        addresses = np.concatenate([np.zeros(0), *(part.gains for part in entered)])
-        self._parts = [part for part, _ in parts]
-        self.arrays = Hooks(
-            order=order,
-            counts=counts,
-            places=places,
-            gains=np.zeros(int(ends[-1, 0]) + len(entered)),
-            memory=np.zeros(int(ends[-1, 1])),
-            values=np.zeros(int(ends[-1, 2])),
+        self._ends, self._entered = ends, list[PythonPart]()
+        self._gains, self._memory, self.values = (np.zeros(int(size)) for size in ends[-1])
+        self._table = np.zeros((len(KINDS), SLOTS, _ENTRY), dtype=np.int64)
+        self._counts = np.zeros(len(KINDS), dtype=np.int64)
+        for hook in sorted(hooks, key=lambda hook: (hook.kind, hook.rank, hook.part)):
+            self._table[hook.kind, self._counts[hook.kind]] = self._entry(hook, joints)
+            self._counts[hook.kind] += 1
+        self.record = new(Hooks, 0)
+        self.record.table, self.record.counts = self._table.ctypes.data, self._counts.ctypes.data
+        point(self.record.values, self.values)
+
+    def _entry(self, hook: Hook, joints: int) -> list[int]:
+        """A row of the table."""
+        arrays, kernel = list(self._shares(hook.part)), hook.kernel
+        if _in_python(hook):
+            entered, kernel = PythonPart(self._call(hook)), python_kernel
+            self._entered.append(entered)
+            arrays[0] = entered.gains
+        entry = [address_of(kernel, hook_signature(joints))]
+        for array in arrays:
+            entry += [array.ctypes.data, array.size]
+        return entry
+
+    def _shares(self, part: int) -> tuple[Array, Array, Array]:
+        """Gains, memory and columns of a part, views of those of all."""
+        first, end = self._ends[part], self._ends[part + 1]
+        return (
+            self._gains[first[0] : end[0]],
+            self._memory[first[1] : end[1]],
+            self.values[first[2] : end[2]],
         )
-        self._first_address = int(ends[-1, 0])
-        self._addresses = addresses
-        functions: list[Any] = []
-        for slot, hook in enumerate(hooks):
-            for k in range(3):
-                places[slot, 2 * k], places[slot, 2 * k + 1] = ends[hook.part, k], ends[hook.part + 1, k]
-            if not _in_python(hook):
-                functions.append(hook.kernel)
-            else:
-                address = self._first_address + sum(f is python_kernel for f in functions)
-                places[slot, 0], places[slot, 1] = address, address + 1
-                functions.append(python_kernel)
-        for kind in range(len(KINDS)):
-            slots = sorted((h.rank, h.part, s) for s, h in enumerate(hooks) if h.kind == kind)
-            counts[kind] = len(slots)
-            order[kind, : len(slots)] = [slot for _, _, slot in slots]
-        functions += [python_kernel] * (SLOTS - count)
-        self.functions = tuple(as_parameter(function, hook_signature(joints)) for function in functions)
 
     def _call(self, hook: Hook) -> Callable[[], int | None]:
-        """What enters a hook in Python; a kernel in plain Python is given its part's slices."""
+        """What enters a hook in Python; a kernel in plain Python is given its part's arrays."""
         if hook.call is not None:
             return hook.call
-
-        def call() -> int:
-            a, kernel = self.arrays, hook.kernel
-            begins, ends = self._ends[hook.part], self._ends[hook.part + 1]
-            gains, memory, values = (
-                array[begins[k] : ends[k]] for k, array in enumerate((a.gains, a.memory, a.values))
-            )
-            return int(kernel(gains, self._world, memory, values))
-
-        return call
+        gains, memory, values = self._shares(hook.part)
+        return lambda: int(hook.kernel(gains, self._world, memory, values))
 
     def fill(self) -> None:
         """Take over the parts' gains and memories, as they are after their start.
@@ -192,34 +168,27 @@ class HookTable:
             SurgsimError: If a part has changed their size since it was attached.
         """
         for k, part in enumerate(self._parts):
-            for name, array, column in (("gains", self.arrays.gains, 0), ("memory", self.arrays.memory, 1)):
-                first, end = self._ends[k, column], self._ends[k + 1, column]
+            for name, share in zip(("gains", "memory"), self._shares(k), strict=False):
                 given = getattr(part, name)
-                if given.shape != (end - first,):
+                if given.shape != share.shape:
                     raise SurgsimError(
-                        f"{type(part).__name__}: {name} had {end - first} numbers when it was attached, "
+                        f"{type(part).__name__}: {name} had {share.size} numbers when it was attached, "
                         f"and has the shape {given.shape} after its start"
                     )
-                array[first:end] = given
-        self.arrays.gains[self._first_address :] = self._addresses
+                share[:] = given
 
     @property
     def state(self) -> dict[str, Array]:
-        """The parts' numbers, memories and columns, without addresses."""
-        a = self.arrays
-        return {
-            "hook_gains": a.gains[: self._first_address],
-            "hook_memory": a.memory,
-            "hook_values": a.values,
-        }
+        """The parts' numbers, memories and columns."""
+        return {"hook_gains": self._gains, "hook_memory": self._memory, "hook_values": self.values}
 
     def values_of(self, part: int) -> Array:
         """The columns of a part, a view of the plant's values."""
-        return self.arrays.values[self._ends[part, 2] : self._ends[part + 1, 2]]
+        return self._shares(part)[2]
 
     def memory_of(self, part: int) -> Array:
         """The memory of a part, a view of that of all."""
-        return self.arrays.memory[self._ends[part, 1] : self._ends[part + 1, 1]]
+        return self._shares(part)[1]
 
     def raised(self) -> BaseException | None:
         """What a hook in Python raised."""

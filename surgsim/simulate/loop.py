@@ -28,11 +28,9 @@ from surgsim.simulate.ticks import (
     GOING,
     NOT_FINITE,
     PLANT_TOLD,
-    ROW_BLOCKS,
     TASK_TOLD,
     UNSAFE,
     Run,
-    Tables,
     ask_signature,
     ask_task,
     hold_signature,
@@ -43,7 +41,7 @@ from surgsim.simulate.ticks import (
 from surgsim.tasks.base import TipCommand
 from surgsim.tasks.binding import BoundTask
 from surgsim.tasks.command import command_of
-from surgsim.tick.arrays import Control, Record, World, new
+from surgsim.tick.arrays import Control, Record, World, new, point
 from surgsim.tick.status import GOES_ON
 from surgsim.trace.trace import BASE_BLOCKS, Ending, Trace, TraceMeta
 
@@ -51,6 +49,7 @@ Array = NDArray[np.float64]
 Progress = Callable[[float, float], None]
 """Called now and then with the simulated time reached and the whole duration [s]."""
 
+_CLOCK_EVERY = 8
 _NO_STOP = StopConfig(duration_s=0.0)
 
 
@@ -90,7 +89,7 @@ class Simulation:
         self._task = BoundTask(setup.task, setup.controller.control.command)
         n = setup.arm.limits.q_min.size
         self._stop = new_stop(scenario.safety.stop or StopConfig(), setup.arm)
-        self._run, self._tables = self._wire(last)
+        self._run = self._wire(last)
         self._run_ticks = as_parameter(run_ticks, run_signature(n))
         self._hold_ticks = as_parameter(hold_ticks, hold_signature(n))
         self._ask_task = as_parameter(ask_task, ask_signature(n))
@@ -100,25 +99,23 @@ class Simulation:
         setup.task.reset()
         self._ask()
 
-    def _wire(self, last: int) -> tuple[Any, Tables]:
-        """The record and the tables of the run."""
-        setup, scenario, plant = self._setup, self._setup.scenario, self._setup.plant
+    def _wire(self, last: int) -> Any:
+        """The record of the run."""
+        setup, scenario = self._setup, self._setup.scenario
         run = new(Run, 0)
         p, controller = run.progress, setup.controller
         p.last, p.most_infeasible = last, scenario.safety.infeasible_ticks_max
         p.reacts, p.uses_torque = setup.task.reacts, scenario.plant.uses_torque
         p.shares_port, p.task_values = controller.estimates, width(setup.task.columns)
         p.resolver_values = width(controller.columns) - 3 * controller.estimates
+        p.clock_every = _CLOCK_EVERY if controller.is_compiled else 1
         self._task.told = run.feedback
-        return run, Tables(
-            rows=self._rows.data,
-            at=self._rows.begins(*ROW_BLOCKS),
-            task_gains=self._task.gains,
-            task_memory=self._task.memory,
-            watch=plant.watch.arrays,
-            hooks=plant.hooks.arrays,
-            minds=controller.minds,
-        )
+        for name in run.at.dtype.names:
+            run.at[name] = self._rows.begins(name)[0]
+        run.rows, run.columns = self._rows.data.ctypes.data, self._rows.data.shape[1]
+        point(run.task_gains, self._task.gains)
+        point(run.task_memory, self._task.memory)
+        return run
 
     @property
     def time_s(self) -> float:
@@ -151,7 +148,7 @@ class Simulation:
         """Whether the next tick ends the run whatever the controller does: time is up, or a limit passed."""
         world, command = self._setup.plant.world, self._setup.controller.control.command
         over = world.tick >= self._run.progress.last or command.finished
-        return bool(over) or not is_safe(self._safety.guard, self._tables.watch, world, command)
+        return bool(over) or not is_safe(self._safety.guard, self._setup.plant.watch.record, world, command)
 
     def run(self, progress: Progress | None = None) -> Trace:
         """Tick to the end; if that is an outcome that stops the arm, stop it and hold it for a while."""
@@ -186,16 +183,16 @@ class Simulation:
         self._run_ticks(
             ticks,
             self._run,
-            self._tables,
             controller.control,
             plant.world,
             plant.bore,
             self._safety.guard,
             self._stop,
+            plant.watch.record,
+            plant.hooks.record,
             self._task.kernel,
             *controller.kernels,
             plant.advance,
-            plant.hooks.functions,
         )
         if self._run.progress.reason != GOING:
             self._ending = self._end(int(self._run.progress.reason))
@@ -235,13 +232,12 @@ class Simulation:
             done = self._hold_ticks(
                 ticks,
                 self._run,
-                self._tables,
                 self._setup.controller.control,
                 plant.world,
                 plant.bore,
                 self._stop,
+                plant.hooks.record,
                 plant.advance,
-                plant.hooks.functions,
             )
             if self._run.progress.reason == PLANT_TOLD:
                 self._end(PLANT_TOLD)
@@ -252,7 +248,7 @@ class Simulation:
     def _ask(self) -> None:
         """The task's command for the present state."""
         c, world = self._setup.controller.control, self._setup.plant.world
-        status = self._ask_task(self._run, self._tables, c, world, self._task.kernel)
+        status = self._ask_task(self._run, c, world, self._task.kernel)
         if status != GOES_ON:
             self._run.progress.status = status
             self._end(TASK_TOLD)

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from surgsim.compiled import compiled
 from surgsim.errors import Outcome
 from surgsim.models.build import JointLimits
-from surgsim.plant.contacts import NOTHING, Watch, forbidden_contact
+from surgsim.plant.contacts import Watch, is_clear
 from surgsim.plant.truth import Truth
 from surgsim.scenario.schema import SafetyConfig
 from surgsim.spatial import shaft_distance
@@ -172,4 +172,4 @@ def is_safe(guard: Guard, watch: Watch, world: World, command: Command) -> bool:
         return False
     if norm(world.f_C) > guard.wall_n or norm(world.f_T) > guard.touch_n:
         return False
-    return not guard.contact or forbidden_contact(watch, world.p_WC)[1] == NOTHING
+    return not guard.contact or is_clear(watch, world)

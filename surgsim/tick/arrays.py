@@ -69,6 +69,27 @@ def type_of(kind: Any, n: int) -> Any:
     return from_dtype(layout(kind, n))
 
 
+class Numbers(Record):
+    """Where an array of doubles is; whoever fills it in keeps the array alive, `views.numbers` reads it.
+
+    Numba counts the references of every array that it is handed, at every call: a few words that say where
+    an array is cost nothing.
+
+    Attributes:
+        address: Of its first entry.
+        size: How many entries.
+    """
+
+    ADDRESSES: ClassVar[frozenset[str]] = frozenset(("address",))
+    address: int
+    size: int
+
+
+def point(where: Any, array: Array) -> None:
+    """Fill in where `array`, contiguous, is; `where` is a record of `Numbers`."""
+    where.address, where.size = array.ctypes.data, array.size
+
+
 class Model(Record):
     """The controller's own model of the arm, evaluated at one state (`surgsim.tick.nominal`).
 
@@ -342,6 +363,28 @@ class Command(Record):
     values: Array
 
 
+class Minds(Record):
+    """Numbers and memories of a controller's parts, and the terms of its torque.
+
+    Attributes:
+        port_gains: Of the port estimator.
+        port_memory: Of the port estimator.
+        resolver_gains: Of the resolver.
+        resolver_memory: Of the resolver.
+        law_gains: Of the torque law.
+        law_memory: Of the torque law.
+        terms: Terms of the torque (k, n) [N m], row by row.
+    """
+
+    port_gains: Numbers
+    port_memory: Numbers
+    resolver_gains: Numbers
+    resolver_memory: Numbers
+    law_gains: Numbers
+    law_memory: Numbers
+    terms: Numbers
+
+
 class Control(Record):
     """A controller at a tick.
 
@@ -352,6 +395,7 @@ class Control(Record):
         q_ref: Joint reference at this tick (n,) [rad].
         torque: Sum of the law's terms (n,) [N m].
         port: Rows position, velocity and acceleration of the estimated port (3, 3).
+        minds: Where the parts' numbers and memories are.
         command: The task's command.
         seen: What the parts see, one after the other: port estimator, resolver, torque law.
         referred: What the resolver sees where it is evaluated at the joint reference.
@@ -367,6 +411,7 @@ class Control(Record):
     q_ref: Array
     torque: Array
     port: Array
+    minds: Minds
     command: Command
     seen: Seen
     referred: Seen

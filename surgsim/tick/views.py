@@ -10,7 +10,7 @@ from numba.extending import intrinsic, overload
 
 from surgsim.compiled import compiled
 from surgsim.tick.algebra import cross
-from surgsim.tick.arrays import Array, World
+from surgsim.tick.arrays import Array, Ids, Numbers, World
 
 
 @intrinsic
@@ -35,6 +35,26 @@ def _doubles(address: Any, rows: Any, columns: Any) -> Any:
         return carray(_pointer(address), (rows, columns), np.float64)  # type: ignore[call-arg]
 
     return view
+
+
+def integers(address: int, size: int) -> Ids:
+    """The whole numbers at `address` as an array (size,), not copied."""
+    pointer = ctypes.cast(int(address), ctypes.POINTER(ctypes.c_int64))
+    return np.ctypeslib.as_array(pointer, (int(size),))
+
+
+@overload(integers)
+def _integers(address: Any, size: Any) -> Any:
+    def view(address: Any, size: Any) -> Any:
+        return carray(_pointer(address), (size,), np.int64)  # type: ignore[call-arg]
+
+    return view
+
+
+@compiled
+def numbers(where: Numbers) -> Array:
+    """The array that is there (size,), not copied."""
+    return vector(where.address, where.size)
 
 
 @compiled

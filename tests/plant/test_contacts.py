@@ -7,7 +7,7 @@ import pytest
 from surgsim.models.build import build
 from surgsim.models.collision import abdomen_semi_axes
 from surgsim.models.config import RobotConfig, SceneConfig, TrocarConfig
-from surgsim.plant.contacts import ContactWatch, body_depth, segment_distance_squared, table_depth
+from surgsim.plant.contacts import ContactWatch, body_gap, is_clear, segment_distance_squared, table_gap
 from surgsim.scenario.load import load_scenario, shipped
 from surgsim.simulate.setup import prepare
 
@@ -36,7 +36,7 @@ def test_depth_in_the_table(seed):
     centre, half = rng.uniform(-0.1, 0.1, 3), rng.uniform(0.1, 0.2, 3)
     outside = np.maximum(np.abs(_points(p0, p1) - centre) - half, 0.0)
     brute = max(0.0, 0.15 - np.linalg.norm(outside, axis=1).min())
-    assert table_depth(p0, p1, 0.15, centre, half) == pytest.approx(brute, abs=3e-3)
+    assert max(0.0, -table_gap(p0, p1, 0.15, centre, half)) == pytest.approx(brute, abs=3e-3)
 
 
 @pytest.mark.parametrize("seed", range(20))
@@ -44,7 +44,7 @@ def test_a_capsule_is_in_the_body_exactly_when_its_axis_is_in_the_larger_ellipso
     p0, p1 = np.random.default_rng(seed).uniform(-0.5, 0.5, (2, 3))
     axes = np.array([0.19, 0.3, 0.16])
     inside = ((_points(p0, p1) / (axes + 0.05)) ** 2).sum(axis=1).min() < 1.0
-    assert (body_depth(p0, p1, 0.05, axes) > 0.0) == inside
+    assert (body_gap(p0, p1, 0.05, axes) < 0.0) == inside
 
 
 def _look(q, scene=SCENE, port=PORT):
@@ -108,3 +108,28 @@ def test_no_shipped_scenario_starts_in_a_contact(name):
     setup = prepare(load_scenario(name, assignments=["theatre=false"]))
     setup.plant.reset(setup.q_start)
     assert setup.plant.truth().contact is None
+
+
+@pytest.mark.parametrize("robot", ["lwr4plus", "panda"])
+def test_what_is_not_looked_at_again_touches_nothing(robot):
+    """Along wild motions of arm and port the kernel with a memory says what a look at everything says."""
+    scenario = load_scenario(f"circle_{robot}", assignments=("plant={type: kinematic}",))
+    setup, rng = prepare(scenario), np.random.default_rng(3)
+    plant, limits = setup.plant, setup.scene.limits
+    other = ContactWatch(setup.scene, plant.data)
+    record = plant.watch.record
+    touched, looks = 0, 0
+    for _ in range(12):
+        plant.reset(setup.q_start)
+        speed = rng.uniform(-0.6, 0.6, len(setup.q_start))
+        for _ in range(600):
+            inside = (plant.world.q > limits.q_min) & (plant.world.q < limits.q_max)
+            plant.step(np.zeros_like(speed), np.where(inside, speed, 0.0))
+            plant.world.p_WC[:] += 1e-4 * rng.standard_normal(3)
+            before = record.q.copy()
+            clear = is_clear(record, plant.world)
+            looks += not np.array_equal(before, record.q)
+            assert clear == (other.look(plant.world.p_WC) is None)
+            touched += not clear
+    assert 100 < touched < 6000
+    assert looks - touched < 900
