@@ -17,6 +17,7 @@ from surgsim.models.arm import Kinematics
 from surgsim.tick.algebra import back_substitute_rows, determinant, dot, factor, outer_product
 from surgsim.tick.arrays import Model
 from surgsim.tick.nominal import kinematics
+from surgsim.tick.scratch import scratch_matrix
 
 Array = NDArray[np.float64]
 
@@ -37,29 +38,46 @@ def jacobian_gradient(J: Array, z: Array) -> Array:
     n = J.shape[1]
     H = np.empty((n, 3, n))
     for i in range(n):
-        for j in range(i, n):
-            x = z[i, 1] * J[2, j] - z[i, 2] * J[1, j]
-            y = z[i, 2] * J[0, j] - z[i, 0] * J[2, j]
-            w = z[i, 0] * J[1, j] - z[i, 1] * J[0, j]
-            H[i, 0, j] = H[j, 0, i] = x
-            H[i, 1, j] = H[j, 1, i] = y
-            H[i, 2, j] = H[j, 2, i] = w
+        fill_jacobian_gradient(J, z, i, H[i])
     return H
+
+
+@compiled
+def fill_jacobian_gradient(J: Array, z: Array, i: int, out: Array) -> None:
+    """Fill dJ/dq_i (3, n) of the translational Jacobian."""
+    for j in range(J.shape[1]):
+        a, b = min(i, j), max(i, j)
+        out[0, j] = z[a, 1] * J[2, b] - z[a, 2] * J[1, b]
+        out[1, j] = z[a, 2] * J[0, b] - z[a, 0] * J[2, b]
+        out[2, j] = z[a, 0] * J[1, b] - z[a, 1] * J[0, b]
 
 
 @compiled
 def diamond(J: Array, H: Array) -> Array:
     """J <> h = [vec(J h_i^T)^T]_i (n, 9); eq. (18) of the VPRNN paper, column-major vec."""
-    n = J.shape[1]
-    D = np.empty((n, 9))
-    for i in range(n):
-        for b in range(3):
-            for a in range(3):
-                s = 0.0
-                for c in range(n):
-                    s += J[a, c] * H[i, b, c]
-                D[i, 3 * b + a] = s
+    D = np.empty((J.shape[1], 9))
+    for i in range(J.shape[1]):
+        _diamond_row(J, H[i], D[i])
     return D
+
+
+@compiled
+def fill_diamond(J: Array, z: Array, D: Array) -> None:
+    """Fill J <> H (n, 9) with the derivatives H of the translational Jacobian, see `jacobian_gradient`."""
+    h = scratch_matrix(3, J.shape[1])
+    for i in range(J.shape[1]):
+        fill_jacobian_gradient(J, z, i, h)
+        _diamond_row(J, h, D[i])
+
+
+@compiled
+def _diamond_row(J: Array, h: Array, out: Array) -> None:
+    for b in range(3):
+        for a in range(3):
+            s = 0.0
+            for c in range(J.shape[1]):
+                s += J[a, c] * h[b, c]
+            out[3 * b + a] = s
 
 
 @compiled
@@ -69,7 +87,7 @@ def fill_log_manipulability_gradient(J: Array, z: Array, out: Array) -> bool:
     d(ln mu)/dq_i = tr(dJ/dq_i J^T (J J^T)^-1), equal to (J <> h) psi with psi = vec((J J^T)^-1).
     """
     n = J.shape[1]
-    A, B = np.empty((3, 3)), np.empty((n, 3))
+    A, B = scratch_matrix(3, 3), scratch_matrix(n, 3)
     outer_product(J, J, A)
     if not factor(A):
         return False
@@ -77,12 +95,13 @@ def fill_log_manipulability_gradient(J: Array, z: Array, out: Array) -> bool:
         for a in range(3):
             B[j, a] = J[a, j]
     back_substitute_rows(A, B)
-    H = jacobian_gradient(J, z)
+    h = scratch_matrix(3, n)
     for i in range(n):
+        fill_jacobian_gradient(J, z, i, h)
         s = 0.0
         for a in range(3):
             for b in range(n):
-                s += B[b, a] * H[i, a, b]
+                s += B[b, a] * h[a, b]
         out[i] = s
     return True
 
@@ -139,7 +158,7 @@ def manipulabilities(model: Model, q: Array) -> tuple[float, float]:
         return math.nan, math.nan
     kinematics(model, q)
     Jv, Jw = model.Jv_WT, model.Jw_WT
-    A, B, whole = np.empty((3, 3)), np.empty((3, 3)), np.empty((6, 6))
+    A, B, whole = scratch_matrix(3, 3), scratch_matrix(3, 3), scratch_matrix(6, 6)
     outer_product(Jv, Jv, A)
     whole[:3, :3] = A
     outer_product(Jw, Jv, B)

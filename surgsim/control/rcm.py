@@ -21,6 +21,7 @@ from surgsim.models.arm import Kinematics
 from surgsim.spatial import cross as cross_product
 from surgsim.spatial import skew
 from surgsim.tick.algebra import cross, dot, times
+from surgsim.tick.scratch import scratch
 
 Array = NDArray[np.float64]
 
@@ -122,8 +123,8 @@ def fill_rcm_bias(
     out: Array,
 ) -> None:
     """Fill `out` (2,) with N (r'' - s d'' - 2 s' d') at zero joint and trocar acceleration."""
-    d, d_dot, d_ddot, turned = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
-    r, r_dot, omega = np.empty(3), np.empty(3), np.empty(3)
+    d, d_dot, d_ddot, turned = scratch(3), scratch(3), scratch(3), scratch(3)
+    r, r_dot, omega = scratch(3), scratch(3), scratch(3)
     times(Jv, v, r_dot)
     times(Jw, v, omega)
     for i in range(3):

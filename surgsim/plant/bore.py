@@ -31,6 +31,7 @@ from surgsim.compiled import compiled
 from surgsim.models.config import WallConfig
 from surgsim.tick.algebra import cross, dot
 from surgsim.tick.arrays import Record, World
+from surgsim.tick.scratch import scratch
 from surgsim.tick.views import body_place, doubles, site_place, vector
 
 Array = NDArray[np.float64]
@@ -253,7 +254,7 @@ def _rub(u: Array, velocity: Array, parameters: Array, memory: Array, seal: Arra
 def _relative_velocity(bore: Bore, world: World, centre: Array, v: Array) -> None:
     """Velocity of the cannula relative to the shaft's point at its centre (3,) [m/s]."""
     axes, anchors = doubles(world.xaxis, world.njnt, 3), doubles(world.xanchor, world.njnt, 3)
-    qvel, arm, turned = vector(world.qvel, world.nv), np.empty(3), np.empty(3)
+    qvel, arm, turned = vector(world.qvel, world.nv), scratch(3), scratch(3)
     for i in range(3):
         for k in range(3):
             v[k] += qvel[bore.first_dof + i] * axes[bore.first_slide + i, k]
@@ -269,7 +270,7 @@ def _relative_velocity(bore: Bore, world: World, centre: Array, v: Array) -> Non
 def _generalized(force: Array, bore: Bore, world: World, centre: Array, arm: Array, cannula: Array) -> None:
     """Fill `arm` (n,) and `cannula` (3,) with J^T of a force on the cannula and its reaction on the shaft."""
     axes, anchors = doubles(world.xaxis, world.njnt, 3), doubles(world.xanchor, world.njnt, 3)
-    lever, turned = np.empty(3), np.empty(3)
+    lever, turned = scratch(3), scratch(3)
     for i in range(arm.size):
         for k in range(3):
             lever[k] = centre[k] - anchors[world.first_joint + i, k]

@@ -11,6 +11,7 @@ from surgsim.compiled import compiled
 from surgsim.models.build import Scene
 from surgsim.plant.truth import Contact
 from surgsim.tick.arrays import Record, World, new
+from surgsim.tick.scratch import scratch
 from surgsim.tick.views import doubles, integers, vector
 
 Array = NDArray[np.float64]
@@ -320,7 +321,7 @@ def box_distance(p0: Array, p1: Array, s: float, centre: Array, half: Array) -> 
 @compiled
 def skin_distance(p0: Array, p1: Array, patient: Array) -> float:
     """Largest distance [m] from the port at which the segment passes the abdomen's skin; 0 if it does not."""
-    port = np.empty(3)
+    port = scratch(3)
     port[0] = -patient[1, 0] * patient[0, 0] - patient[1, 1] * patient[0, 1]
     port[1] = -patient[1, 0] * patient[0, 1] + patient[1, 1] * patient[0, 0]
     port[2] = -patient[0, 2]

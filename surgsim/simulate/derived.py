@@ -12,6 +12,7 @@ from surgsim.compiled import compiled
 from surgsim.control.manipulability import manipulabilities
 from surgsim.tick.algebra import cross, norm
 from surgsim.tick.arrays import A2, I1, Model, type_of
+from surgsim.tick.scratch import scratch
 
 Array = NDArray[np.float64]
 Ids = NDArray[np.int64]
@@ -44,7 +45,7 @@ def derive(model: Model, rows: Array, at: Ids) -> int:
 
     The RCM error is the trocar's distance from the shaft's line: |(p_WC - p_WT) x a| with the unit axis a.
     """
-    reach, axis, off = np.empty(3), np.empty(3), np.empty(3)
+    reach, axis, off = scratch(3), scratch(3), scratch(3)
     for k in range(rows.shape[0]):
         row = rows[k]
         for i in range(3):

@@ -8,14 +8,13 @@ falls, and its instrument is in a patient.
 import math
 from typing import Any, ClassVar
 
-import numpy as np
-
 from surgsim.compiled import compiled
 from surgsim.models.arm import ArmModel
 from surgsim.scenario.schema import StopConfig
 from surgsim.tick.algebra import times
 from surgsim.tick.arrays import Array, Model, Record, World, new
 from surgsim.tick.nominal import dynamics, kinematics
+from surgsim.tick.scratch import scratch
 
 _LEAST_TORQUE_NM = 1.0
 
@@ -84,7 +83,7 @@ def brake(stop: Stop, world: World) -> None:
     n, M, bias = world.q_m.size, stop.nominal.M, stop.nominal.bias
     kinematics(stop.nominal, world.q_m)
     dynamics(stop.nominal, world.v_m)
-    wanted = np.empty(n)
+    wanted = scratch(n)
     if not stop.begun:
         times(M, world.v_m, wanted)
         length = 1e-9

@@ -3,13 +3,13 @@
 import math
 from typing import Any, ClassVar, Literal
 
-import numpy as np
 from pydantic import NonNegativeFloat, PositiveFloat
 
 from surgsim.compiled import compiled
 from surgsim.tasks.base import DURATION, HOLD, NUMBERS, RAMP, Array, PathTaskConfig, Turns, follow
 from surgsim.tasks.profile import progress
 from surgsim.tick.arrays import Command, Feedback
+from surgsim.tick.scratch import scratch_matrix
 from surgsim.tick.status import GOES_ON
 
 
@@ -28,7 +28,7 @@ def depth_path(numbers: Array, s: float, rows: Array) -> None:
 def depth(gains: Array, feedback: Feedback, memory: Array, out: Command) -> int:
     """The path followed with the profile's progress."""
     s, s_dot, s_ddot = progress(gains[HOLD], gains[DURATION], gains[RAMP], feedback.t_s)
-    rows = np.empty((3, 3))
+    rows = scratch_matrix(3, 3)
     depth_path(gains[NUMBERS:], s, rows)
     follow(gains, rows, s_dot, s_ddot, out)
     return GOES_ON

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surgsim.compiled import compiled
+from surgsim.tick.scratch import scratch, scratch_matrix
 
 Array = NDArray[np.float64]
 DEPENDENT = 1e-14
@@ -74,17 +75,18 @@ def outer_product(A: Array, B: Array, out: Array) -> None:
 def factor(A: Array) -> bool:
     """A (n, n), symmetric, becomes its lower Cholesky factor; False where it is not positive definite."""
     n = A.shape[0]
-    for i in range(n):
-        for j in range(i + 1):
+    for j in range(n):
+        s = A[j, j]
+        for k in range(j):
+            s -= A[j, k] * A[j, k]
+        if not s > DEPENDENT * A[j, j]:
+            return False
+        A[j, j] = math.sqrt(s)
+        for i in range(j + 1, n):  # column by column: these do not wait for each other
             s = A[i, j]
             for k in range(j):
                 s -= A[i, k] * A[j, k]
-            if i != j:
-                A[i, j] = s / A[j, j]
-            elif not s > DEPENDENT * A[i, i]:
-                return False
-            else:
-                A[i, i] = math.sqrt(s)
+            A[i, j] = s / A[j, j]
     return True
 
 
@@ -106,9 +108,20 @@ def back_substitute(L: Array, x: Array) -> None:
 
 @compiled
 def back_substitute_rows(L: Array, X: Array) -> None:
-    """Every row of X (m, n) becomes (L L^T)^-1 times it."""
-    for i in range(X.shape[0]):
-        back_substitute(L, X[i])
+    """Every row of X (m, n) becomes (L L^T)^-1 times it; they go side by side, since none waits."""
+    n, m = L.shape[0], X.shape[0]
+    for i in range(n):
+        for row in range(m):
+            s = X[row, i]
+            for k in range(i):
+                s -= L[i, k] * X[row, k]
+            X[row, i] = s / L[i, i]
+    for i in range(n - 1, -1, -1):
+        for row in range(m):
+            s = X[row, i]
+            for k in range(i + 1, n):
+                s -= L[k, i] * X[row, k]
+            X[row, i] = s / L[i, i]
 
 
 @compiled
@@ -147,7 +160,7 @@ def nearest(J: Array, v: Array, wanted: Array, out: Array) -> bool:
     False where J (m, n) has lost rank. `out` may be `wanted`.
     """
     m = J.shape[0]
-    A, gap = np.empty((m, m)), np.empty(m)
+    A, gap = scratch_matrix(m, m), scratch(m)
     outer_product(J, J, A)
     if not factor(A):
         return False

@@ -18,6 +18,8 @@ import numpy as np
 from numba import from_dtype, types
 from numpy.typing import NDArray
 
+from surgsim.errors import SurgsimError
+
 Array = NDArray[np.float64]
 Kernel = Callable[..., int]
 Ids = NDArray[np.int64]
@@ -27,6 +29,8 @@ A2 = types.float64[:, ::1]
 A3 = types.float64[:, :, ::1]
 I1 = types.int64[::1]
 I2 = types.int64[:, ::1]
+MOST_JOINTS = 8
+"""Most joints of an arm; kernels set room aside for them."""
 MOST_VALUES = 64
 """Most columns that a task or a resolver can add to the trace."""
 
@@ -44,7 +48,13 @@ class Record:
 
 @cache
 def layout(kind: Any, n: int) -> np.dtype[Any]:
-    """Memory layout of a record for `n` joints: C's, with its alignment."""
+    """Memory layout of a record for `n` joints: C's, with its alignment.
+
+    Raises:
+        SurgsimError: If there are more joints than kernels have room for.
+    """
+    if n > MOST_JOINTS:
+        raise SurgsimError(f"the arm has {n} joints; at most {MOST_JOINTS} are supported")
     fields: list[tuple[Any, ...]] = []
     for name, hint in get_type_hints(kind).items():
         if name in kind.SHAPES:

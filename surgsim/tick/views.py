@@ -11,6 +11,7 @@ from numba.extending import intrinsic, overload
 from surgsim.compiled import compiled
 from surgsim.tick.algebra import cross
 from surgsim.tick.arrays import Array, Ids, Numbers, World
+from surgsim.tick.scratch import scratch
 
 
 @intrinsic
@@ -75,7 +76,7 @@ def applied_wrench(world: World, body: int) -> Array:
 def push_at(world: World, body: int, point: Array, force: Array) -> None:
     """Add a force (3,) [N] on a body at a point (3,) [m], with its moment about the centre of mass."""
     wrench, centre = applied_wrench(world, body), centre_of_mass(world, body)
-    arm, moment = np.empty(3), np.empty(3)
+    arm, moment = scratch(3), scratch(3)
     for i in range(3):
         arm[i] = point[i] - centre[i]
     cross(arm, force, moment)

@@ -15,6 +15,7 @@ from surgsim.control.rcm import fill_rcm
 from surgsim.models.arm import ArmModel
 from surgsim.tick.algebra import back_substitute, back_substitute_rows, dot, factor, norm, outer_product
 from surgsim.tick.arrays import Seen
+from surgsim.tick.scratch import scratch, scratch_matrix
 from surgsim.tick.status import GOES_ON, RANK_LOST
 
 Array = NDArray[np.float64]
@@ -102,7 +103,8 @@ def interaction_force(gains: Array, seen: Seen, memory: Array, out: Array) -> in
         gains[OBSERVER],
         dt,
     )
-    force, push = np.empty(3), np.zeros(3)
+    force, push = scratch(3), scratch(3)
+    push[:] = 0.0
     if not _lateral_force(seen, d, force):
         return RANK_LOST
     memory[6] += 1.0
@@ -116,7 +118,7 @@ def interaction_force(gains: Array, seen: Seen, memory: Array, out: Array) -> in
         if size > gains[THRESHOLD]:
             for i in range(3):
                 push[i] = force[i] * (1.0 - gains[THRESHOLD] / size)
-    moved = np.empty(3)
+    moved = scratch(3)
     for i in range(3):
         moved[i] = offset[i] + dt * gains[COMPLIANCE] * push[i]
     within = min(1.0, gains[MOST] / max(norm(moved), 1e-12))
@@ -144,8 +146,8 @@ def interaction_force(gains: Array, seen: Seen, memory: Array, out: Array) -> in
 def _lateral_force(seen: Seen, d: Array, out: Array) -> bool:
     """Lateral force of the wall on the shaft, world frame (3,) [N]; False where J_rcm has lost rank."""
     n = d.size
-    error, J, velocity = np.empty(2), np.empty((2, n)), np.empty(2)
-    N = np.empty((2, 3))
+    error, J, velocity = scratch(2), scratch_matrix(2, n), scratch(2)
+    N = scratch_matrix(2, 3)
     fill_rcm(
         seen.p_WT,
         seen.R_WT,
@@ -158,7 +160,8 @@ def _lateral_force(seen: Seen, d: Array, out: Array) -> bool:
         velocity,
         N,
     )
-    L, Y, A, f = seen.M.copy(), J.copy(), np.empty((2, 2)), np.empty(2)
+    L, Y, A, f = scratch_matrix(n, n), scratch_matrix(2, n), scratch_matrix(2, 2), scratch(2)
+    L[:], Y[:] = seen.M, J
     if not factor(L):
         return False
     back_substitute_rows(L, Y)

@@ -10,10 +10,11 @@ from surgsim.catalog import PartConfig
 from surgsim.compiled import compiled
 from surgsim.control.manipulability import fill_log_manipulability_gradient
 from surgsim.control.resolvers.base import KernelResolver
-from surgsim.control.resolvers.rows import answer, task_rows
+from surgsim.control.resolvers.rows import answer, fill_task_rows
 from surgsim.models.arm import ArmModel
 from surgsim.tick.algebra import nearest
 from surgsim.tick.arrays import Resolved, Seen
+from surgsim.tick.scratch import scratch, scratch_matrix
 from surgsim.tick.status import GOES_ON, RANK_LOST
 
 Array = NDArray[np.float64]
@@ -48,8 +49,9 @@ def gradient(gains: Array, seen: Seen, memory: Array, out: Resolved) -> int:
     The gradient is scaled to the velocity limits as a whole before it is projected, so that a large k gives a
     bounded self-motion. Source: Liegeois 1977; the comparison of the VPRNN paper, section IV.
     """
-    J, v = task_rows(seen, gains[0], gains[1], gains[2] != 0.0)
-    climb = np.empty(seen.q.size)
+    n, m = seen.q.size, 3 + (seen.rows if gains[2] != 0.0 else 0)
+    J, v, climb = scratch_matrix(m, n), scratch(m), scratch(n)
+    fill_task_rows(seen, gains[0], gains[1], J, v)
     if not fill_log_manipulability_gradient(seen.Jv_WT, seen.z_W, climb):
         return RANK_LOST
     most = 1.0

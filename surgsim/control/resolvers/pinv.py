@@ -9,10 +9,11 @@ from pydantic import NonNegativeFloat
 from surgsim.catalog import PartConfig
 from surgsim.compiled import compiled
 from surgsim.control.resolvers.base import KernelResolver
-from surgsim.control.resolvers.rows import answer, task_rows
+from surgsim.control.resolvers.rows import answer, fill_task_rows
 from surgsim.models.arm import ArmModel
 from surgsim.tick.algebra import nearest
 from surgsim.tick.arrays import Resolved, Seen
+from surgsim.tick.scratch import scratch, scratch_matrix
 from surgsim.tick.status import GOES_ON, RANK_LOST
 
 Array = NDArray[np.float64]
@@ -44,10 +45,12 @@ def pinv(gains: Array, seen: Seen, memory: Array, out: Resolved) -> int:
 
         q' = pinv(J) v,    eq. (2)-(5) of the manipulability paper
 
-    J = J_T (3, n), or [J_T; J_rcm] (5, n); v is the desired velocity with feedback, see `task_rows`.
+    J = J_T (3, n), or [J_T; J_rcm] (5, n); v is the desired velocity with feedback, see `fill_task_rows`.
     """
-    J, v = task_rows(seen, gains[0], gains[1], gains[2] != 0.0)
-    qdot = np.zeros(seen.q.size)
+    n, m = seen.q.size, 3 + (seen.rows if gains[2] != 0.0 else 0)
+    J, v, qdot = scratch_matrix(m, n), scratch(m), scratch(n)
+    fill_task_rows(seen, gains[0], gains[1], J, v)
+    qdot[:] = 0.0
     if not nearest(J, v, qdot, qdot):
         return RANK_LOST
     answer(seen, qdot, J, v, out)

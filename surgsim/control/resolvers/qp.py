@@ -21,9 +21,10 @@ from surgsim.control.resolvers.program import (
     examined,
     solve_warm,
 )
-from surgsim.control.resolvers.rows import answer, fill_braking, task_rows
+from surgsim.control.resolvers.rows import answer, fill_braking, fill_task_rows
 from surgsim.models.arm import ArmModel
 from surgsim.tick.arrays import Resolved, Seen
+from surgsim.tick.scratch import scratch, scratch_matrix
 from surgsim.tick.status import GOES_ON, INFEASIBLE, RANK_LOST
 
 Array = NDArray[np.float64]
@@ -128,7 +129,9 @@ def _solved_in_python(solver: Solver, gains: Array, seen: Seen, memory: Array, o
 @compiled
 def _answer(gains: Array, seen: Seen, x: Array, last: Array, out: Resolved) -> None:
     """The program's answer inside Omega, which is remembered."""
-    J, v = task_rows(seen, gains[K_TIP], gains[K_RCM], True)
+    m = 3 + seen.rows
+    J, v = scratch_matrix(m, seen.q.size), scratch(m)
+    fill_task_rows(seen, gains[K_TIP], gains[K_RCM], J, v)
     answer(seen, x[: seen.q.size], J, v, out)
     last[:] = out.qdot
 
@@ -137,8 +140,9 @@ def _answer(gains: Array, seen: Seen, x: Array, last: Array, out: Resolved) -> N
 def qp_program(gains: Array, seen: Seen, last: Array) -> tuple[bool, Program]:
     """The program over (q', s) after the last joint velocity `last` (n,); False where J_T has lost rank."""
     n, soft = seen.q.size, int(gains[SOFT])
-    J, v = task_rows(seen, gains[K_TIP], gains[K_RCM], True)
-    rows, walls = v.size, (gains.size - WALLS) // 4
+    rows, walls = 3 + seen.rows, (gains.size - WALLS) // 4
+    J, v = scratch_matrix(rows, n), scratch(rows)
+    fill_task_rows(seen, gains[K_TIP], gains[K_RCM], J, v)
     H, f = np.zeros((n + soft, n + soft)), np.zeros(n + soft)
     lower, upper = np.full(n + soft, -np.inf), np.full(n + soft, np.inf)
     G, low = np.zeros((rows + walls, n + soft)), np.full(rows + walls, -np.inf)

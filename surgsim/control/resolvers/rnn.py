@@ -9,12 +9,13 @@ from pydantic import Field, NonNegativeFloat, PositiveFloat
 
 from surgsim.catalog import PartConfig
 from surgsim.compiled import compiled
-from surgsim.control.manipulability import diamond, jacobian_gradient
+from surgsim.control.manipulability import fill_diamond
 from surgsim.control.resolvers.base import KernelResolver
-from surgsim.control.resolvers.rows import answer, task_rows
+from surgsim.control.resolvers.rows import answer, fill_task_rows
 from surgsim.models.arm import ArmModel
 from surgsim.tick.algebra import back_substitute_rows, factor, outer_product, times, transposed_times
 from surgsim.tick.arrays import Resolved, Seen
+from surgsim.tick.scratch import scratch, scratch_matrix
 from surgsim.tick.status import DIVERGED, GOES_ON, RANK_LOST
 
 Array = NDArray[np.float64]
@@ -95,15 +96,17 @@ def rnn(gains: Array, seen: Seen, memory: Array, out: Resolved) -> int:
     """
     n = seen.q.size
     omega, phi, sigma, lam = memory[:n], memory[n : n + 9], memory[n + 9 : n + 18], memory[n + 18 :]
-    A = np.empty((3, 3))
+    A = scratch_matrix(3, 3)
     outer_product(seen.Jv_WT, seen.Jv_WT, A)
     if seen.first != 0 and not _inverse(A, phi):
         return RANK_LOST
-    J, v = task_rows(seen, gains[5], gains[6], gains[7] != 0.0)
-    D = diamond(seen.Jv_WT, jacobian_gradient(seen.Jv_WT, seen.z_W))
+    m = 3 + (seen.rows if gains[7] != 0.0 else 0)
+    J, v, D, mean = scratch_matrix(m, n), scratch(m), scratch_matrix(n, 9), scratch(n)
+    fill_task_rows(seen, gains[5], gains[6], J, v)
+    fill_diamond(seen.Jv_WT, seen.z_W, D)
     substeps = math.ceil(seen.dt_s / (gains[9] * gains[4]) - 1e-9)
     h = seen.dt_s / substeps / gains[4]
-    mean = np.zeros(n)
+    mean[:] = 0.0
     _flow(gains, seen, J, v, D, A, omega, phi, sigma, lam[: v.size], h, substeps, mean)
     for i in range(9):
         if not (abs(phi[i]) < _DIVERGED and abs(sigma[i]) < _DIVERGED):
@@ -115,9 +118,13 @@ def rnn(gains: Array, seen: Seen, memory: Array, out: Resolved) -> int:
 @compiled
 def _inverse(A: Array, out: Array) -> bool:
     """Out (9,) = vec(A^-1) of a symmetric A (3, 3); False where it is singular."""
-    L, X = A.copy(), np.eye(3)
+    L, X = scratch_matrix(3, 3), scratch_matrix(3, 3)
+    L[:] = A
     if not factor(L):
         return False
+    for i in range(3):
+        for j in range(3):
+            X[i, j] = 1.0 if i == j else 0.0
     back_substitute_rows(L, X)
     for i in range(3):
         for j in range(3):
@@ -155,8 +162,8 @@ def _flow(
     """`substeps` explicit Euler steps of length `h` time constants; `mean` is that of omega over them."""
     c0, c1, c2, c3, sign = gains[0], gains[1], gains[2], gains[3], gains[8]
     n, m = omega.size, v.size
-    gap, pull, inside, climb = np.empty(m), np.empty(m), np.empty(n), np.empty(n)
-    B_phi, B_gap, B_sigma, turned = np.empty(9), np.empty(9), np.empty(9), np.empty(9)
+    gap, pull, inside, climb = scratch(m), scratch(m), scratch(n), scratch(n)
+    B_phi, B_gap, B_sigma, turned = scratch(9), scratch(9), scratch(9), scratch(9)
     for _ in range(substeps):
         times(J, omega, gap)
         for i in range(m):

@@ -13,22 +13,18 @@ Array = NDArray[np.float64]
 
 
 @compiled
-def task_rows(seen: Seen, k_tip: float, k_rcm: float, rcm: bool) -> tuple[Array, Array]:
+def fill_task_rows(seen: Seen, k_tip: float, k_rcm: float, J: Array, v: Array) -> None:
     """Rows [J_T; J_rcm] (5, n) and right side [v_d; v_rcm] (5,), eq. (20) of the VPRNN paper.
 
-    v_d = -k1 (p - p_d) + p_d', v_rcm = -k2 e + N C'. Without a trocar, or with `rcm` False, the three tip
-    rows alone.
+    v_d = -k1 (p - p_d) + p_d', v_rcm = -k2 e + N C'. The first three, of the tip, alone, where J and v have
+    no room for more.
     """
-    extra = seen.rows if rcm else 0
-    n = seen.q.size
-    J, v = np.empty((3 + extra, n)), np.empty(3 + extra)
     for i in range(3):
         J[i] = seen.Jv_WT[i]
         v[i] = seen.v_WTd[i] - k_tip * (seen.p_WT[i] - seen.p_WTd[i])
-    for i in range(extra):
+    for i in range(v.size - 3):
         J[3 + i] = seen.J_rcm[i]
         v[3 + i] = seen.rcm_velocity[i] - k_rcm * seen.rcm_error[i]
-    return J, v
 
 
 @compiled

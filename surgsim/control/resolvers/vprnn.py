@@ -9,9 +9,9 @@ from pydantic import Field, NonNegativeFloat, PositiveFloat
 
 from surgsim.catalog import PartConfig
 from surgsim.compiled import compiled
-from surgsim.control.manipulability import diamond, jacobian_gradient
+from surgsim.control.manipulability import fill_diamond
 from surgsim.control.resolvers.base import KernelResolver
-from surgsim.control.resolvers.rows import answer
+from surgsim.control.resolvers.rows import answer, fill_task_rows
 from surgsim.models.arm import ArmModel
 from surgsim.tick.algebra import (
     back_substitute,
@@ -25,6 +25,7 @@ from surgsim.tick.algebra import (
     transposed_times,
 )
 from surgsim.tick.arrays import Resolved, Seen
+from surgsim.tick.scratch import scratch, scratch_matrix
 from surgsim.tick.status import DIVERGED, GOES_ON, RANK_LOST
 
 Array = NDArray[np.float64]
@@ -109,8 +110,9 @@ def vprnn(gains: Array, seen: Seen, memory: Array, out: Resolved) -> int:
     Source: VPRNN paper, section III; eq. (20), (21), (25)-(29). A cap on exp(t) and the projection on two
     RCM rows are ours: the paper's W is singular with the three cross-product rows.
     """
-    J, v = network_rows(gains, seen)
-    qdot = np.empty(seen.q.size)
+    n, m = seen.q.size, network_size(gains, seen)
+    J, v, qdot = scratch_matrix(m, n), scratch(m), scratch(n)
+    fill_network_rows(gains, seen, J, v)
     if gains[EULER] != 0.0:
         solved = _step_euler(gains, seen, memory, J, v, qdot)
     else:
@@ -125,27 +127,28 @@ def vprnn(gains: Array, seen: Seen, memory: Array, out: Resolved) -> int:
 
 
 @compiled
-def network_rows(gains: Array, seen: Seen) -> tuple[Array, Array]:
-    """Rows [J_T; J_rcm] (m, n) and right side [v_d; v_rcm] (m,) of eq. (20)."""
-    n, wide = seen.q.size, gains[CROSS] != 0.0
-    r = 0 if seen.rows == 0 else (3 if wide else 2)
-    J, v = np.empty((3 + r, n)), np.empty(3 + r)
-    for i in range(3):
-        J[i] = seen.Jv_WT[i]
-        v[i] = seen.v_WTd[i] - gains[K1] * (seen.p_WT[i] - seen.p_WTd[i])
-    if r == 2:
-        for i in range(2):
-            J[3 + i] = seen.J_rcm[i]
-            v[3 + i] = seen.rcm_velocity[i] - gains[K2] * seen.rcm_error[i]
-    elif r == 3:
+def network_size(gains: Array, seen: Seen) -> int:
+    """Number of rows of the network: three of the tip, and two or three of the RCM with a trocar."""
+    if seen.rows == 0:
+        return 3
+    return 6 if gains[CROSS] != 0.0 else 5
+
+
+@compiled
+def fill_network_rows(gains: Array, seen: Seen, J: Array, v: Array) -> None:
+    """Fill rows [J_T; J_rcm] (m, n) and right side [v_d; v_rcm] (m,) of eq. (20)."""
+    cross_rows = v.size == 6
+    fill_task_rows(
+        seen, gains[K1], gains[K2], J[: 3 if cross_rows else v.size], v[: 3 if cross_rows else v.size]
+    )
+    if cross_rows:
         _cross_rows(gains[K2], seen, J[3:], v[3:])
-    return J, v
 
 
 @compiled
 def _cross_rows(k2: float, seen: Seen, J: Array, v: Array) -> None:
     """Rows of E_rcm = d x (p - C), eq. (2): dE = [d]x Jv + [r]x [d]x Jw; their right side d x C' - k2 E."""
-    d, r, E, a, b = np.empty(3), np.empty(3), np.empty(3), np.empty(3), np.empty(3)
+    d, r, E, a, b = scratch(3), scratch(3), scratch(3), scratch(3), scratch(3)
     for i in range(3):
         d[i] = seen.R_WT[i, 2]
         r[i] = seen.p_WT[i] - seen.p_WC[i]
@@ -182,7 +185,7 @@ def right_side(gains: Array, J: Array, v: Array, A: Array, l: Array) -> None:  #
 def _step_exact(gains: Array, seen: Seen, memory: Array, J: Array, v: Array, qdot: Array) -> bool:
     """One period of the network in closed form; False where its system is singular."""
     n, m = J.shape[1], v.size
-    A, right = np.empty((3, 3)), np.empty(n + 18 + m)
+    A, right = scratch_matrix(3, 3), scratch(n + 18 + m)
     outer_product(seen.Jv_WT, seen.Jv_WT, A)
     right_side(gains, J, v, A, right)
     delta = memory[: right.size]
@@ -193,7 +196,8 @@ def _step_exact(gains: Array, seen: Seen, memory: Array, J: Array, v: Array, qdo
     decay(delta, gains[BETA] * exponential_integral(t, t + seen.dt_s, gains[CAP]), gains[BOUND])
     for i in range(right.size):
         right[i] += delta[i]
-    D = diamond(seen.Jv_WT, jacobian_gradient(seen.Jv_WT, seen.z_W))
+    D = scratch_matrix(n, 9)
+    fill_diamond(seen.Jv_WT, seen.z_W, D)
     return recover_qdot(gains, J, A, D, right, qdot)
 
 
@@ -233,14 +237,15 @@ def recover_qdot(gains: Array, J: Array, A: Array, D: Array, rhs: Array, qdot: A
     The three cross-product rows have rank 2: their least-squares solution is taken.
     """
     n, m = J.shape[1], J.shape[0]
-    L, X = A.copy(), np.empty((3, 3))
+    L, X = scratch_matrix(3, 3), scratch_matrix(3, 3)
+    L[:] = A
     if not factor(L):
         return False
     for i in range(3):
         for k in range(3):
             X[i, k] = rhs[n + 9 + m + 3 * i + k]
     back_substitute_rows(L, X)
-    P, b = np.empty((n, n)), np.empty(n)
+    P, b = scratch_matrix(n, n), scratch(n)
     for i in range(n):
         s = rhs[i]
         for k in range(9):
@@ -256,7 +261,8 @@ def recover_qdot(gains: Array, J: Array, A: Array, D: Array, rhs: Array, qdot: A
         return _least_squares(P, J, b, rhs[n + 9 : n + 9 + m], qdot)
     if not factor(P):
         return False
-    Y, S, gap = J.copy(), np.empty((m, m)), np.empty(m)
+    Y, S, gap = scratch_matrix(m, n), scratch_matrix(m, m), scratch(m)
+    Y[:] = J
     back_substitute_rows(P, Y)
     outer_product(J, Y, S)
     if not factor(S):
@@ -326,7 +332,9 @@ def _step_euler(gains: Array, seen: Seen, memory: Array, J: Array, v: Array, qdo
     A, l = np.empty((3, 3)), np.empty(size)  # noqa: E741 - the paper's name
     outer_product(seen.Jv_WT, seen.Jv_WT, A)
     right_side(gains, J, v, A, l)
-    W = system(gains, J, A, diamond(seen.Jv_WT, jacobian_gradient(seen.Jv_WT, seen.z_W)))
+    D = scratch_matrix(n, 9)
+    fill_diamond(seen.Jv_WT, seen.z_W, D)
+    W = system(gains, J, A, D)
     if seen.first != 0:
         l_old[:] = l
         W_old[:] = W

@@ -21,6 +21,7 @@ from surgsim.tick.algebra import (
     transposed_times,
 )
 from surgsim.tick.arrays import Seen
+from surgsim.tick.scratch import scratch, scratch_matrix
 from surgsim.tick.status import GOES_ON, RANK_LOST
 
 Array = NDArray[np.float64]
@@ -76,15 +77,16 @@ def hierarchical_impedance(gains: Array, seen: Seen, memory: Array, out: Array) 
     operational-space formulation that it cites (Khatib 1987; Sandoval et al. 2017; Su et al. 2019).
     """
     n, r = seen.q.size, seen.rows
-    J, L = np.empty((3 + r, n)), seen.M.copy()
+    J, JMinv, L = scratch_matrix(3 + r, n), scratch_matrix(3 + r, n), scratch_matrix(n, n)
+    L[:] = seen.M
     J[:3] = seen.Jv_WT
     for i in range(r):
         J[3 + i] = seen.J_rcm[i]
-    JMinv = J.copy()
+    JMinv[:] = J
     if not factor(L):
         return RANK_LOST
     back_substitute_rows(L, JMinv)
-    force, rate = np.empty(3), np.empty(3)
+    force, rate = scratch(3), scratch(3)
     times(seen.Jv_WT, seen.v, rate)
     for i in range(3):
         force[i] = gains[i] * (seen.p_WTd[i] - seen.p_WT[i]) + gains[3 + i] * (seen.v_WTd[i] - rate[i])
@@ -114,7 +116,7 @@ def project_torque(J: Array, JMinv: Array, tau: Array) -> bool:
         tau: Joint torque (n,) [N m], changed in place.
     """
     m = J.shape[0]
-    A, force = np.empty((m, m)), np.empty(m)
+    A, force = scratch_matrix(m, m), scratch(m)
     outer_product(JMinv, J, A)
     if not factor(A):
         return False

@@ -32,6 +32,7 @@ from surgsim.tick.algebra import (
 )
 from surgsim.tick.arrays import Model, Seen
 from surgsim.tick.nominal import copy_model, dynamics, kinematics
+from surgsim.tick.scratch import scratch, scratch_matrix
 from surgsim.tick.status import GOES_ON, INFEASIBLE, RANK_LOST
 
 Array = NDArray[np.float64]
@@ -149,7 +150,8 @@ def rcm_inverse_dynamics(gains: Array, seen: Seen, memory: Array, out: Array) ->
     ticks = estimate_delay(delayed, first, seen.tau, most, dt)
     late = ticks * dt
     share = min(1.0, gains[FULL_GAIN] / late) if ticks > 0 else 1.0
-    touch, tau, d = np.zeros(n), np.empty(n), np.empty(n)
+    touch, tau, d = scratch(n), scratch(n), scratch(n)
+    touch[:] = 0.0
     if gains[YIELDS] != 0.0:
         transposed_times(seen.Jv_WT, seen.f_T, touch)
     offset = torque_offset(delayed, most, n)
@@ -160,7 +162,8 @@ def rcm_inverse_dynamics(gains: Array, seen: Seen, memory: Array, out: Array) ->
         d[i] = learnt[i] + touch[i]
     model = seen.elsewhere
     if ticks > 0:
-        q, v = seen.q.copy(), seen.v.copy()
+        q, v = scratch(n), scratch(n)
+        q[:], v[:] = seen.q, seen.v
         if not predict(q, v, seen.M, seen.bias, d, seen.damping, delayed, ticks, dt):
             return RANK_LOST
         kinematics(model, q)
@@ -197,7 +200,8 @@ def predict(
     milliseconds.
     """
     n = q.size
-    L, rate = M.copy(), np.empty(n)
+    L, rate = scratch_matrix(n, n), scratch(n)
+    L[:] = M
     for i in range(n):
         L[i, i] += dt * damping[i]
     if not factor(L):
@@ -217,7 +221,7 @@ def _task_accelerations(
     gains: Array, seen: Seen, model: Model, late: float, share: float, J: Array, a: Array
 ) -> None:
     """Fill rows J (m, n) and accelerations a (m,) of tip and RCM at `model`'s state, `late` [s] from now."""
-    linear, angular, rate = np.empty(3), np.empty(3), np.empty(3)
+    linear, angular, rate = scratch(3), scratch(3), scratch(3)
     fill_velocity_products(model.Jv_WT, model.z_W, model.v, linear, angular)
     ahead = max(late - gains[SENSOR_DELAY], 0.0)
     times(model.Jv_WT, model.v, rate)
@@ -230,12 +234,12 @@ def _task_accelerations(
         a[i] = seen.a_WTd[i] - linear[i] + pull
     if a.size == 3:
         return
-    p_WC, v_WC = np.empty(3), np.empty(3)
+    p_WC, v_WC = scratch(3), scratch(3)
     for i in range(3):
         p_WC[i] = seen.p_WC[i] + late * (seen.v_WC[i] + 0.5 * late * seen.a_WC[i])
         v_WC[i] = seen.v_WC[i] + late * seen.a_WC[i]
-    error, moving, bias = np.empty(2), np.empty(2), np.empty(2)
-    normals = np.empty((2, 3))
+    error, moving, bias = scratch(2), scratch(2), scratch(2)
+    normals = scratch_matrix(2, 3)
     fill_rcm(model.p_WT, model.R_WT, model.Jv_WT, model.Jw_WT, p_WC, v_WC, error, J[3:], moving, normals)
     fill_rcm_bias(
         model.p_WT, model.R_WT, model.Jv_WT, model.Jw_WT, model.v, p_WC, v_WC, linear, angular, bias
@@ -247,20 +251,20 @@ def _task_accelerations(
 
 
 @compiled
-def _give_way(M: Array, J: Array, f: Array, a: Array) -> bool:
-    """Add to `a` the acceleration of the tip along the force `f` on it, the further rows of J held."""
-    m, size = J.shape[0], dot(f, f)
+def _give_way(A: Array, f: Array, a: Array) -> bool:
+    """Add to `a` the acceleration of the tip along the force `f` on it, the further rows held.
+
+    A is the Cholesky factor of J M^-1 J^T (m, m).
+    """
+    m, size = A.shape[0], dot(f, f)
     if size == 0.0:
         return True
-    L, Y, A, inverse = M.copy(), J.copy(), np.empty((m, m)), np.eye(m)
-    if not factor(L):
-        return False
-    back_substitute_rows(L, Y)
-    outer_product(J, Y, A)
-    if not factor(A):
-        return False
+    inverse, held, moved = scratch_matrix(m, m), scratch_matrix(3, 3), scratch(3)
+    for i in range(m):
+        for j in range(m):
+            inverse[i, j] = 1.0 if i == j else 0.0
     back_substitute_rows(A, inverse)
-    held, moved = inverse[:3, :3].copy(), f.copy()
+    held[:], moved[:] = inverse[:3, :3], f
     if not factor(held):
         return False
     back_substitute(held, moved)
@@ -274,21 +278,22 @@ def _give_way(M: Array, J: Array, f: Array, a: Array) -> bool:
 def _terms(gains: Array, seen: Seen, model: Model, late: float, d: Array, share: float, out: Array) -> int:
     """Fill the terms of the torque for the state of `model`, which is reached `late` [s] from now."""
     n, m, M = seen.q.size, 3 + seen.rows, model.M
-    J, a, posture = np.empty((m, n)), np.empty(m), np.empty(n)
+    J, a, posture = scratch_matrix(m, n), scratch(m), scratch(n)
     _task_accelerations(gains, seen, model, late, share, J, a)
-    if gains[YIELDS] != 0.0 and not _give_way(M, J, seen.f_T, a):
-        return RANK_LOST
     ahead = max(late - gains[SENSOR_DELAY], 0.0)
     for i in range(n):
         gap = seen.q_ref[i] + ahead * seen.qdot_ref[i] - model.q[i]
         turning = share * gains[D_JOINT] * (seen.qdot_ref[i] - model.v[i])
         posture[i] = share * share * gains[K_JOINT] * gap + turning
-    L, Y, A, force = M.copy(), J.copy(), np.empty((m, m)), np.empty(m)
+    L, Y, A, force = scratch_matrix(n, n), scratch_matrix(m, n), scratch_matrix(m, m), scratch(m)
+    L[:], Y[:] = M, J
     if not factor(L):
         return RANK_LOST
     back_substitute_rows(L, Y)
     outer_product(J, Y, A)
     if not factor(A):
+        return RANK_LOST
+    if gains[YIELDS] != 0.0 and not _give_way(A, seen.f_T, a):
         return RANK_LOST
     times(J, posture, force)
     for i in range(m):
@@ -297,7 +302,7 @@ def _terms(gains: Array, seen: Seen, model: Model, late: float, d: Array, share:
     transposed_times(J[:3], force[:3], out[TIP])
     transposed_times(J[3:], force[3:], out[RCM])
     times(M, posture, out[JOINT])
-    qddot, constant, torque, most = np.empty(n), np.empty(n), np.empty(n), np.empty(n)
+    qddot, constant, torque, most = scratch(n), scratch(n), scratch(n), scratch(n)
     transposed_times(Y, force, qddot)
     for i in range(n):
         qddot[i] += posture[i]
@@ -309,11 +314,11 @@ def _terms(gains: Array, seen: Seen, model: Model, late: float, d: Array, share:
     times(M, qddot, torque)
     for i in range(n):
         torque[i] += constant[i]
-    low, high = np.empty(n), np.empty(n)
+    low, high = scratch(n), scratch(n)
     fill_acceleration_bounds(seen, model.q, model.v, low, high)
     if allows(torque, most, qddot, low, high):
         return GOES_ON
-    kept = np.empty(n)
+    kept = scratch(n)
     status = prioritised(M, constant, J, a, posture, low, high, most, kept)
     if status == GOES_ON:
         for i in range(n):

@@ -17,6 +17,7 @@ from surgsim.teleop.tremor import TremorConfig, resonance, shake
 from surgsim.tick.algebra import norm
 from surgsim.tick.arrays import World
 from surgsim.tick.mujoco_calls import mj_objectVelocity
+from surgsim.tick.scratch import scratch
 from surgsim.tick.status import GOES_ON
 from surgsim.tick.views import push_at, site_place
 
@@ -67,7 +68,7 @@ def guide(gains: Array, world: World, memory: Array, out: Array) -> int:
     if memory[HOLDS] == 0.0:
         memory[HOLDS] = 1.0
         memory[PLACE : PLACE + 3] = place
-    moving, force = np.empty(6), np.empty(3)  # angular, then linear
+    moving, force = scratch(6), scratch(3)  # angular, then linear
     mj_objectVelocity(world.mj_model, world.mj_data, _SITE, world.entry, moving.ctypes.data, 0)
     s, rate = _progress(gains, world.step_s)
     for i in range(3):

@@ -13,6 +13,7 @@ from surgsim.models.build import Scene
 from surgsim.models.config import Vec3
 from surgsim.plant.disturbances.base import Direction, Disturbance, DisturbanceConfig, pointed
 from surgsim.tick.arrays import World
+from surgsim.tick.scratch import scratch
 from surgsim.tick.status import GOES_ON
 from surgsim.tick.views import body_place, push_at, site_place, site_turn
 
@@ -37,7 +38,7 @@ def push(gains: Array, world: World, memory: Array, out: Array) -> int:
     level = push_level(gains, world.step_s)
     if level == 0.0:
         return GOES_ON
-    body, site, force, point = int(gains[BODY]), int(gains[SITE]), np.empty(3), np.empty(3)
+    body, site, force, point = int(gains[BODY]), int(gains[SITE]), scratch(3), scratch(3)
     for i in range(3):
         force[i] = level * gains[FORCE + i]
         if site < 0:

@@ -16,6 +16,7 @@ from surgsim.spatial import unit
 from surgsim.tick.algebra import dot
 from surgsim.tick.arrays import World
 from surgsim.tick.mujoco_calls import mj_objectVelocity
+from surgsim.tick.scratch import scratch
 from surgsim.tick.status import GOES_ON
 from surgsim.tick.views import push_at, site_place
 
@@ -60,7 +61,7 @@ def press(gains: Array, world: World, memory: Array, out: Array) -> int:
     tip = site_place(world, world.tip)
     if dot(gains[NORMAL], gains[POINT] - tip) <= 0.0:
         return GOES_ON
-    moving = np.empty(6)  # angular, then linear
+    moving = scratch(6)  # angular, then linear
     mj_objectVelocity(world.mj_model, world.mj_data, _SITE, world.tip, moving.ctypes.data, 0)
     force = tissue_force(tip, moving[3:], gains[POINT], gains[NORMAL], gains[LAW])
     push_at(world, world.jaws, tip, force)

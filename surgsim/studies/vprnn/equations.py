@@ -12,7 +12,8 @@ from surgsim.control.resolvers.vprnn import (
     VprnnConfig,
     decay,
     exponential_integral,
-    network_rows,
+    fill_network_rows,
+    network_size,
     recover_qdot,
     right_side,
     system,
@@ -38,7 +39,9 @@ class Network:
     def __init__(self, config: VprnnConfig, arm: ArmModel, problem: VelocityProblem) -> None:
         self.resolver = config.build(arm)
         seen, self._gains = self.resolver.seen(problem), self.resolver.gains
-        self._J, v = network_rows(self._gains, seen)
+        m = network_size(self._gains, seen)
+        self._J, v = np.empty((m, seen.q.size)), np.empty(m)
+        fill_network_rows(self._gains, seen, self._J, v)
         Jv = problem.kin.Jv_WT
         self._A = np.ascontiguousarray(Jv @ Jv.T)
         self._D = diamond(Jv, jacobian_gradient(Jv, problem.kin.z_W))
