@@ -34,22 +34,36 @@ def fill_acceleration_bounds(seen: Seen, q: Array, v: Array, low: Array, high: A
         low: Filled with the lower bounds (n,) [rad/s^2].
         high: Filled with the upper bounds (n,) [rad/s^2].
     """
-    dt = seen.dt_s
+    ahead = _HORIZON_TICKS * seen.dt_s
     for i in range(q.size):
-        top, stop = SPEED_SHARE * seen.v_max[i], BRAKING_SHARE * seen.a_max[i]
-        up = min(top, stopping_speed(seen.q_max[i] - q[i], stop, _GAIN_PER_S, dt))
-        down = min(top, stopping_speed(q[i] - seen.q_min[i], stop, _GAIN_PER_S, dt))
-        high[i] = (up - v[i]) / (_HORIZON_TICKS * dt)
-        low[i] = (-down - v[i]) / (_HORIZON_TICKS * dt)
+        high[i] = (_top_speed(seen, i, seen.q_max[i] - q[i]) - v[i]) / ahead
+        low[i] = (-_top_speed(seen, i, q[i] - seen.q_min[i]) - v[i]) / ahead
 
 
 @compiled
-def allows(torque: Array, torque_limit: Array, qddot: Array, low: Array, high: Array) -> bool:
-    """Whether torque (n,) [N m] and acceleration (n,) [rad/s^2] keep all limits."""
+def allows(torque: Array, torque_limit: Array, qddot: Array, seen: Seen, q: Array, v: Array) -> bool:
+    """Whether torque (n,) [N m] and acceleration (n,) [rad/s^2] keep all limits.
+
+    The bounds of acceleration are those of `fill_acceleration_bounds`. Only the one that a joint is on its
+    way to is looked at: the other one cannot be passed.
+    """
+    ahead = _HORIZON_TICKS * seen.dt_s
     for i in range(torque.size):
-        if not (abs(torque[i]) <= torque_limit[i] and low[i] <= qddot[i] <= high[i]):
+        if not abs(torque[i]) <= torque_limit[i]:
+            return False
+        reached = v[i] + ahead * qddot[i]
+        room = seen.q_max[i] - q[i] if reached > 0.0 else q[i] - seen.q_min[i]
+        if not abs(reached) <= _top_speed(seen, i, room):
             return False
     return True
+
+
+@compiled
+def _top_speed(seen: Seen, i: int, room: float) -> float:
+    """Speed [rad/s] that joint i may have with `room` [rad] left before its range ends."""
+    stop = BRAKING_SHARE * seen.a_max[i]
+    speed: float = min(SPEED_SHARE * seen.v_max[i], stopping_speed(room, stop, _GAIN_PER_S, seen.dt_s))
+    return speed
 
 
 @compiled

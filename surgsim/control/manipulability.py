@@ -71,6 +71,23 @@ def fill_diamond(J: Array, z: Array, D: Array) -> None:
 
 
 @compiled
+def fill_diamond_product(J: Array, z: Array, X: Array, out: Array) -> None:
+    """Fill (J <> H) psi (n,) with psi[3 b + a] = X[b, a], without the matrix: tr(dJ/dq_i J^T X^T)."""
+    n = J.shape[1]
+    h, Y = scratch_matrix(3, n), scratch_matrix(3, n)
+    for b in range(3):
+        for c in range(n):
+            Y[b, c] = X[b, 0] * J[0, c] + X[b, 1] * J[1, c] + X[b, 2] * J[2, c]
+    for i in range(n):
+        fill_jacobian_gradient(J, z, i, h)
+        s = 0.0
+        for b in range(3):
+            for c in range(n):
+                s += h[b, c] * Y[b, c]
+        out[i] = s
+
+
+@compiled
 def _diamond_row(J: Array, h: Array, out: Array) -> None:
     for b in range(3):
         for a in range(3):

@@ -56,10 +56,12 @@ def observe(
     if first:
         d[:] = 0.0
     else:
+        for j in range(n):
+            last[j] = (v[j] - last[j]) / dt
         for i in range(n):
             s = 0.0
             for j in range(n):
-                s += inertia[i, j] * ((v[j] - last[j]) / dt)
+                s += inertia[i, j] * last[j]
             d[i] += gain * (s - (tau[i] - rest[i]))
     for i in range(n):
         for j in range(n):

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surgsim.compiled import compiled
+from surgsim.tick.algebra import factor, norm
 
 Array = NDArray[np.float64]
 Ids = NDArray[np.int64]
@@ -46,15 +47,9 @@ def _inverse_factor(H: Array, K: Array) -> bool:
     n = H.shape[0]
     for i in range(n):
         for j in range(i + 1):
-            s = H[i, j]
-            for k in range(j):
-                s -= K[i, k] * K[j, k]
-            if i != j:
-                K[i, j] = s / K[j, j]
-            elif not s > 1e-14 * H[i, i]:
-                return False
-            else:
-                K[i, i] = math.sqrt(s)
+            K[i, j] = H[i, j]
+    if not factor(K):
+        return False
     for i in range(n):
         scale = 1.0 / K[i, i]
         for j in range(i):
@@ -158,19 +153,19 @@ def _miss(
     """By how much row k is missed, relative to its length and bound, and on which side; (0, 0) if kept."""
     n = x.size
     low, high = _bounds(lower, upper, G_lower, G_upper, k)
+    value, size = 0.0, 1.0
     if k < n:
-        value, size = x[k], 1.0
+        value = x[k]
     else:
-        value = square = 0.0
         for j in range(n):
             value += G[k - n, j] * x[j]
-            square += G[k - n, j] * G[k - n, j]
-        size = math.sqrt(square)
+    if low <= value <= high:
+        return 0.0, 0
+    if k >= n:
+        size = norm(G[k - n])
     if value > high:
         return (value - high) / (size + abs(high)), 1
-    if value < low:
-        return (low - value) / (size + abs(low)), -1
-    return 0.0, 0
+    return (low - value) / (size + abs(low)), -1
 
 
 @compiled

@@ -27,7 +27,7 @@ def _on_stack(size: int) -> Any:
     @intrinsic
     def stack(context: Any) -> Any:
         def generate(_: Any, builder: Any, signature: Any, values: Any) -> Any:
-            place = cgutils.alloca_once(builder, ir.DoubleType(), size=size)
+            place = cgutils.alloca_once(builder, ir.DoubleType(), size=size)  # type: ignore[no-untyped-call]
             return builder.bitcast(place, cgutils.voidptr_t)
 
         return types.voidptr(), generate
@@ -54,7 +54,7 @@ def scratch_matrix(rows: int, columns: int) -> Array:
 @overload(scratch, inline="always")
 def _scratch(size: Any) -> Any:
     def view(size: Any) -> Any:
-        return carray(_vector_on_stack(), (size,), np.float64)  # type: ignore[call-arg]
+        return carray(_vector_on_stack(), (size,), np.float64)
 
     return view
 
@@ -62,6 +62,6 @@ def _scratch(size: Any) -> Any:
 @overload(scratch_matrix, inline="always")
 def _scratch_matrix(rows: Any, columns: Any) -> Any:
     def view(rows: Any, columns: Any) -> Any:
-        return carray(_matrix_on_stack(), (rows, columns), np.float64)  # type: ignore[call-arg]
+        return carray(_matrix_on_stack(), (rows, columns), np.float64)
 
     return view

@@ -9,7 +9,7 @@ from pydantic import Field, NonNegativeFloat, PositiveFloat
 
 from surgsim.catalog import PartConfig
 from surgsim.compiled import compiled
-from surgsim.control.manipulability import fill_diamond
+from surgsim.control.manipulability import fill_diamond, fill_diamond_product
 from surgsim.control.resolvers.base import KernelResolver
 from surgsim.control.resolvers.rows import answer, fill_task_rows
 from surgsim.models.arm import ArmModel
@@ -196,9 +196,7 @@ def _step_exact(gains: Array, seen: Seen, memory: Array, J: Array, v: Array, qdo
     decay(delta, gains[BETA] * exponential_integral(t, t + seen.dt_s, gains[CAP]), gains[BOUND])
     for i in range(right.size):
         right[i] += delta[i]
-    D = scratch_matrix(n, 9)
-    fill_diamond(seen.Jv_WT, seen.z_W, D)
-    return recover_qdot(gains, J, A, D, right, qdot)
+    return recover_qdot(gains, seen.Jv_WT, seen.z_W, J, A, right, qdot)
 
 
 @compiled
@@ -228,7 +226,7 @@ def exponential_integral(start: float, end: float, cap: float) -> float:
 
 
 @compiled
-def recover_qdot(gains: Array, J: Array, A: Array, D: Array, rhs: Array, qdot: Array) -> bool:
+def recover_qdot(gains: Array, Jv: Array, z_W: Array, J: Array, A: Array, rhs: Array, qdot: Array) -> bool:
     """Joint velocity q' (n,) of W z = rhs through the block structure of W; False where W is singular.
 
         psi = vec(A^-1 Rhs_5),  P = h1 I + h2 J_T^T J_T + h3 J_rcm^T J_rcm,  b = rhs_q + h0 D psi
@@ -245,16 +243,16 @@ def recover_qdot(gains: Array, J: Array, A: Array, D: Array, rhs: Array, qdot: A
         for k in range(3):
             X[i, k] = rhs[n + 9 + m + 3 * i + k]
     back_substitute_rows(L, X)
-    P, b = scratch_matrix(n, n), scratch(n)
+    P, b, weighed = scratch_matrix(n, n), scratch(n), scratch(m)
+    fill_diamond_product(Jv, z_W, X, b)
     for i in range(n):
-        s = rhs[i]
-        for k in range(9):
-            s += gains[H0] * D[i, k] * X[k // 3, k % 3]
-        b[i] = s
+        b[i] = rhs[i] + gains[H0] * b[i]
+        for k in range(m):
+            weighed[k] = (gains[H2] if k < 3 else gains[H3]) * J[k, i]
         for j in range(i + 1):
             s = gains[H1] if i == j else 0.0
             for k in range(m):
-                s += (gains[H2] if k < 3 else gains[H3]) * J[k, i] * J[k, j]
+                s += weighed[k] * J[k, j]
             P[i, j] = s
             P[j, i] = s
     if gains[CROSS] != 0.0 and m > 3:

@@ -314,11 +314,10 @@ def _terms(gains: Array, seen: Seen, model: Model, late: float, d: Array, share:
     times(M, qddot, torque)
     for i in range(n):
         torque[i] += constant[i]
-    low, high = scratch(n), scratch(n)
-    fill_acceleration_bounds(seen, model.q, model.v, low, high)
-    if allows(torque, most, qddot, low, high):
+    if allows(torque, most, qddot, seen, model.q, model.v):
         return GOES_ON
-    kept = scratch(n)
+    low, high, kept = scratch(n), scratch(n), scratch(n)
+    fill_acceleration_bounds(seen, model.q, model.v, low, high)
     status = prioritised(M, constant, J, a, posture, low, high, most, kept)
     if status == GOES_ON:
         for i in range(n):

@@ -44,8 +44,9 @@ class Network:
         fill_network_rows(self._gains, seen, self._J, v)
         Jv = problem.kin.Jv_WT
         self._A = np.ascontiguousarray(Jv @ Jv.T)
-        self._D = diamond(Jv, jacobian_gradient(Jv, problem.kin.z_W))
-        self.W: Array = system(self._gains, self._J, self._A, self._D)
+        self._Jv, self._z_W = Jv, problem.kin.z_W
+        D = diamond(Jv, jacobian_gradient(Jv, problem.kin.z_W))
+        self.W: Array = system(self._gains, self._J, self._A, D)
         self.l: Array = np.zeros(len(self.W))
         right_side(self._gains, self._J, v, self._A, self.l)
 
@@ -60,7 +61,7 @@ class Network:
             numpy.linalg.LinAlgError: If W is singular.
         """
         qdot = np.zeros(self._J.shape[1])
-        if not recover_qdot(self._gains, self._J, self._A, self._D, self.l + delta, qdot):
+        if not recover_qdot(self._gains, self._Jv, self._z_W, self._J, self._A, self.l + delta, qdot):
             raise np.linalg.LinAlgError("W is singular")
         return qdot
 
