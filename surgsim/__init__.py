@@ -67,4 +67,4 @@ if not TYPE_CHECKING:  # to a type checker it would mean that there is every nam
 
 
 def __dir__() -> list[str]:
-    return sorted([*globals(), *_PLACES])
+    return sorted({*globals(), *_PLACES})

@@ -46,6 +46,17 @@ def plane_axes(normal: Array, direction: Array) -> tuple[Array, Array, Array]:
     return x, cross(z, x), z
 
 
+def nearest_on_line(p: Array, a: Array, b: Array) -> Array:
+    """Points (n, 3) of the lines through `a` and `b` that are nearest to `p`, each (n, 3) [m].
+
+    p_b + d dᵀ(p - p_b), d the line's direction.
+    """
+    d = b - a
+    d = d / np.linalg.norm(d, axis=1, keepdims=True)
+    nearest: Array = b + np.sum((p - b) * d, axis=1, keepdims=True) * d
+    return nearest
+
+
 @compiled
 def shaft_distance(p_C: Array, p_T: Array, p_R: Array) -> float:
     """Distance of point `p_C` from the line through `p_R` and `p_T` [m]: the RCM error."""

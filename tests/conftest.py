@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from batches import short_run
 
 from surgsim.contract import problems
 from surgsim.control.problem import VelocityProblem
@@ -18,15 +19,6 @@ from surgsim.simulate.setup import Setup
 from surgsim.trace.trace import BASE_BLOCKS, Ending, Trace, TraceMeta
 
 pytest_plugins = ["left_out"]
-
-SHORT = (
-    "theatre=false",
-    "task.duration_s=0.3",
-    "task.ramp_s=0.1",
-    "task.hold_start_s=0",
-    "task.hold_end_s=0",
-    "task.radius_m=0.002",
-)
 
 
 @pytest.fixture(scope="session")
@@ -59,7 +51,7 @@ def scenario() -> Callable[..., Scenario]:
 
     def make(*assignments: str, controller: str | None = None, seed: int | None = None) -> Scenario:
         return load_scenario(
-            "circle_lwr4plus", controller=controller, assignments=[*SHORT, *assignments], seed=seed
+            "circle_lwr4plus", controller=controller, assignments=[*short_run(0.3), *assignments], seed=seed
         )
 
     return make

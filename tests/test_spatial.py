@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from surgsim.spatial import cross, plane_axes, shaft_distance, skew, unit
+from surgsim.spatial import cross, nearest_on_line, plane_axes, shaft_distance, skew, unit
 
 vectors = st.lists(st.floats(-10, 10), min_size=3, max_size=3).map(np.array)
 
@@ -43,3 +43,13 @@ def test_shaft_distance_is_the_distance_from_the_infinite_line():
     tip, wrist = np.array([0.0, 0.0, 0.0]), np.array([0.0, 0.0, 2.0])
     for z in (-3.0, 0.5, 9.0):
         assert shaft_distance(np.array([3.0, 4.0, z]), tip, wrist) == pytest.approx(5.0)
+
+
+def test_the_nearest_point_of_a_line_is_that_of_least_squares():
+    """min |b + t (b - a) - p| over t, by the normal equations of each line."""
+    p, a, b = np.random.default_rng(3).normal(size=(3, 20, 3))
+    found = nearest_on_line(p, a, b)
+    for i in range(20):
+        t = np.linalg.lstsq((b[i] - a[i])[:, None], p[i] - b[i], rcond=None)[0]
+        np.testing.assert_allclose(found[i], b[i] + t * (b[i] - a[i]), atol=1e-12)
+        assert np.linalg.norm(found[i] - p[i]) == pytest.approx(shaft_distance(p[i], b[i], a[i]))

@@ -2,7 +2,6 @@
 
 import os
 import shutil
-import sys
 import tempfile
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager, nullcontext
@@ -12,12 +11,10 @@ from typing import Any
 from surgsim.api.comparison import Comparison
 from surgsim.api.suites import suite_of
 from surgsim.cli.output import show_batch_progress
-from surgsim.compare.engine import Batch, Runner
+from surgsim.compare.choice import runner_of, workers_for
+from surgsim.compare.engine import Batch
 from surgsim.compare.engine import compare as run_batch
-from surgsim.compare.job import Job
-from surgsim.compare.observations import metric_named
 from surgsim.compare.suite import with_changes
-from surgsim.compare.workers import Done, run_jobs
 from surgsim.control.controller import ControllerConfig
 from surgsim.errors import SurgsimError
 from surgsim.scenario.load import Source
@@ -75,10 +72,8 @@ def compare(
         'tip_error_rms_mm'
     """
     suite, folder = suite_of(what, controllers)
-    suite = with_changes(
-        suite, None, _seeds(seeds), record, assignments_of(blocks, settings), _known(matters)
-    )
-    runner, count = _runner(engine, address), _jobs(jobs)
+    suite = with_changes(suite, None, _seeds(seeds), record, assignments_of(blocks, settings), matters)
+    runner, count = runner_of(engine, address), workers_for(jobs)
     with _target(out) as target, _shown(suite.name, progress) as report:
         batch = Batch(
             suite=suite, folder=folder, out=target, jobs=count, resume=resume, command="surgsim.compare"
@@ -115,55 +110,6 @@ def _seeds(seeds: str | int | Iterable[int] | None) -> str | None:
     return ",".join(map(str, listed))
 
 
-def _known(matters: Mapping[str, float] | None) -> Mapping[str, float] | None:
-    """`matters`, if each is of a metric."""
-    for name in matters or {}:
-        metric_named(name)
-    return matters
-
-
-def _jobs(jobs: int | None) -> int:
-    if jobs is None:
-        return len(os.sched_getaffinity(0))
-    if jobs < 1:
-        raise SurgsimError(f"--jobs: {jobs} is not allowed: must be 1 or more")
-    return jobs
-
-
 def _shown(name: str, progress: bool) -> AbstractContextManager[Callable[[int, int, str], None] | None]:
     """The command's progress, or none."""
     return show_batch_progress(name) if progress else nullcontext()
-
-
-def _runner(engine: str, address: str | None) -> Runner:
-    """What runs the jobs."""
-    if address and engine != "ray":
-        raise SurgsimError("--address is for --engine ray")
-    if engine == "local":
-        return _run_jobs
-    if engine != "ray":
-        raise SurgsimError(f"--engine: '{engine}' is not allowed. Allowed: local, ray.")
-    from surgsim.compare.ray_engine import ray_runner
-
-    runner: Runner = ray_runner(address)
-    return runner
-
-
-def _run_jobs(jobs: Sequence[Job], count: int) -> Iterator[Done]:
-    """The local workers, for a script without `if __name__ == "__main__"` too."""
-    with _script_hidden():
-        yield from run_jobs(jobs, count)
-
-
-@contextmanager
-def _script_hidden() -> Iterator[None]:
-    """Keep new processes from running the user's script again: workers need nothing of it."""
-    main = sys.modules["__main__"]
-    hidden: dict[str, Any] = {
-        name: vars(main).pop(name) for name in ("__file__", "__spec__") if name in vars(main)
-    }
-    main.__spec__ = None
-    try:
-        yield
-    finally:
-        vars(main).update(hidden)

@@ -20,8 +20,8 @@ from surgsim.compare.summary import summary
 from surgsim.compare.table import read_table
 from surgsim.display import WIDTH, count, html_table, html_title, number, text_table
 from surgsim.errors import SurgsimError, not_held
-from surgsim.report.results import read_results
-from surgsim.report.write import write_report
+from surgsim.report.results import Results, results_of
+from surgsim.report.write import write_page
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -36,6 +36,13 @@ _NOTE = (
 )
 
 
+class _Keeper:
+    """Removes a folder when nobody holds it any more."""
+
+    def __init__(self, folder: Path) -> None:
+        weakref.finalize(self, shutil.rmtree, folder, ignore_errors=True)
+
+
 class Comparison(Mapping[str, Run]):
     """Runs of several scenarios, controllers and seeds: a mapping of their ids to them.
 
@@ -44,7 +51,7 @@ class Comparison(Mapping[str, Run]):
     Args:
         folder: The results folder.
         table: One row per run.
-        temporary: Whether the folder is removed with this object.
+        temporary: Whether the folder is removed once nobody holds this object or a run of it.
 
     Example:
         >>> import surgsim
@@ -62,8 +69,7 @@ class Comparison(Mapping[str, Run]):
     def __init__(self, folder: Path, table: pa.Table, *, temporary: bool = False) -> None:
         self.folder = folder
         self.table = table
-        if temporary:
-            weakref.finalize(self, shutil.rmtree, folder, ignore_errors=True)
+        self._keeper = _Keeper(folder) if temporary else None
 
     @staticmethod
     def of_folder(folder: str | os.PathLike[str]) -> "Comparison":
@@ -73,15 +79,12 @@ class Comparison(Mapping[str, Run]):
             SurgsimError: If it is not finished, or damaged.
         """
         place = Path(folder)
-        if (place / "suite.json").is_file() and not (place / "runs.parquet").is_file():
-            there = count(len(list(place.glob("runs/*/*/*/metrics.json"))), "run")
-            raise SurgsimError(f"{place}: the batch is not finished: {there} there, no table yet")
         return Comparison(place, read_table(place))
 
     def __getitem__(self, run_id: str) -> Run:
         if run_id not in self._folders:
             raise not_held(run_id, "run of this batch", self._folders, "list(comparison)")
-        return read_run(self.folder / self._folders[run_id])
+        return read_run(self.folder / self._folders[run_id], self._keeper)
 
     def __iter__(self) -> Iterator[str]:
         return iter(self._folders)
@@ -95,8 +98,12 @@ class Comparison(Mapping[str, Run]):
         return dict(zip(*columns, strict=True))
 
     @cached_property
+    def _results(self) -> Results:
+        return results_of(self.folder, self.table)
+
+    @property
     def _runs(self) -> Observations:
-        return read_results(self.folder).runs
+        return self._results.runs
 
     @property
     def controllers(self) -> list[str]:
@@ -139,7 +146,7 @@ class Comparison(Mapping[str, Run]):
         Raises:
             SurgsimError: If the disk refuses.
         """
-        return write_report(self.folder, path)
+        return write_page(self._results, path)
 
     def __repr__(self) -> str:
         said = fill(self.leaderboard().sentence, WIDTH, break_long_words=False)

@@ -33,6 +33,7 @@ class Run:
         scenario: The resolved scenario; None: read it from the folder or the trace.
         trace: The trace; None: read it from the recording.
         folder: The run's folder; None for a run in memory or a lone recording.
+        keeper: What the folder lives as long as; held here, so that it lives as long as the run.
 
     Example:
         >>> import surgsim
@@ -50,11 +51,13 @@ class Run:
         scenario: Scenario | None = None,
         trace: Trace | None = None,
         folder: Path | None = None,
+        keeper: object = None,
     ) -> None:
         self._summary = summary
         self._scenario = scenario
         self._trace = trace
         self.folder = folder
+        self._keeper = keeper
 
     @property
     def name(self) -> str:
@@ -168,8 +171,8 @@ class Run:
         return f"{self.name}, {self.controller}, seed {self.seed}"
 
 
-def read_run(folder: Path) -> Run:
-    """The run in a folder.
+def read_run(folder: Path, keeper: object = None) -> Run:
+    """The run in a folder; `keeper` is what the folder lives as long as, if that is not for ever.
 
     Raises:
         RecordingError: If it is none, a file of it is not as it was written, or another version wrote it.
@@ -181,4 +184,4 @@ def read_run(folder: Path) -> Run:
     summary = read_sealed(file)
     if missing := [key for key in _NEEDED if key not in summary]:
         raise RecordingError(f"{file} is not a run's metrics.json: it has no '{missing[0]}'")
-    return Run(summary, folder=folder)
+    return Run(summary, folder=folder, keeper=keeper)

@@ -12,7 +12,7 @@ from surgsim.cli.output import show_progress
 from surgsim.cli.scenario_options import naming_file
 from surgsim.control.controller import ControllerConfig
 from surgsim.errors import UnreachableError
-from surgsim.runs.folder import check_target, execute, summary_of_result, write_run
+from surgsim.runs.folder import execute, run_to_folder, summary_of_result
 from surgsim.scenario.load import Source
 from surgsim.scenario.schema import Scenario
 from surgsim.simulate.loop import Progress
@@ -56,17 +56,16 @@ def run(
     """
     checked = load(scenario, controller=controller, seed=seed, settings=settings, **blocks)
     folder = None if out is None else Path(out)
-    if folder is not None:
-        check_target(folder)
     try:
         with _shown(checked, progress) as report:
-            result = execute(checked, report)
+            if folder is None:
+                result = execute(checked, report)
+            else:
+                result = run_to_folder(checked, folder, record=record, progress=report)
     except UnreachableError as error:
         if isinstance(scenario, str | os.PathLike):
             raise naming_file(os.fspath(scenario), error) from error
         raise
-    if folder is not None:
-        write_run(checked, result, folder, record=record)
     return Run(summary_of_result(checked, result), scenario=checked, trace=result.trace, folder=folder)
 
 

@@ -5,7 +5,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from surgsim.compare.suite import GivenConfig, SuiteConfig, ad_hoc_suite, is_suite, load_suite, with_changes
+from surgsim.compare.choice import suite_named
+from surgsim.compare.suite import GivenConfig, SuiteConfig, with_changes
 from surgsim.control.controller import ControllerConfig
 from surgsim.errors import SurgsimError
 from surgsim.scenario.load import Source, load_controller, load_scenario
@@ -25,20 +26,12 @@ def suite_of(
     """
     scenarios: Contents = {}
     named = [_scenario(one, scenarios) for one in _several(what, "a suite, or scenarios")]
-    suite, folder = _suite(named, scenarios)
+    suite, folder = suite_named(named, scenarios)
     if controllers is None:
         return _holding(suite, scenarios, {}), folder
     contents: Contents = {}
     names = [_controller(one, contents) for one in _several(controllers, "controllers")]
     return with_changes(_holding(suite, scenarios, contents), names, None, record=False), folder
-
-
-def _suite(named: list[str], scenarios: Contents) -> tuple[SuiteConfig, Path]:
-    if named[0] in scenarios or not is_suite(named[0]):
-        return ad_hoc_suite(named, None), Path()
-    if len(named) > 1:
-        raise SurgsimError("give one suite, or scenarios; not both")
-    return load_suite(named[0])
 
 
 def _several(given: Any, what: str) -> list[Any]:

@@ -22,8 +22,8 @@ def execute(options: argparse.Namespace) -> int:
     """Print what a tick costs beside a bare step, for every shipped controller."""
     import json
 
-    from surgsim.cli.output import format_number
     from surgsim.cli.table import print_table
+    from surgsim.display import number
     from surgsim.runs.bench import bench
 
     rows = bench(options.duration, options.repeat)
@@ -31,7 +31,7 @@ def execute(options: argparse.Namespace) -> int:
         print(json.dumps(rows, indent=2))
         return 0
     names = list(rows[0])
-    table = [[row["run"], *(format_number(row[name]) for name in names[1:])] for row in rows]
+    table = [[row["run"], *(number(row[name]) for name in names[1:])] for row in rows]
     print_table(
         "a tick beside bare mj_step of the same model, thread time", names, table, right=range(1, len(names))
     )

@@ -1,7 +1,6 @@
 """`surgsim compare`."""
 
 import argparse
-import os
 import re
 import shlex
 import sys
@@ -11,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from surgsim.cli.paths import path_argument
-from surgsim.cli.scenario_options import add_settings
+from surgsim.cli.scenario_options import add_matters, add_settings
 
 MOST_SHARDS = 10_000
 HELP = "run a suite of scenarios and controllers, and compare them"
@@ -42,13 +41,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--shard", metavar="I/N", default="1/1", help="only every Nth run, from the Ith")
     parser.add_argument("--record", action="store_true", help="write a recording of every run")
     parser.add_argument("--metric", default="rcm_error_rms_mm", help="metric of the leaderboard")
-    parser.add_argument(
-        "--matters",
-        action="append",
-        default=[],
-        metavar="METRIC=VALUE",
-        help="smallest difference that matters",
-    )
+    add_matters(parser)
     parser.add_argument("--json", action="store_true", help="print the leaderboard as JSON")
 
 
@@ -56,25 +49,27 @@ def execute(options: argparse.Namespace) -> int:
     """Run the suite; 0 when its table is whole, 1 while other shards are missing or if a run crashed."""
     from surgsim.cli.output import show_batch_progress
     from surgsim.cli.table import print_prose
+    from surgsim.compare.choice import runner_of, workers_for
     from surgsim.compare.engine import Batch, compare
+    from surgsim.compare.observations import metric_named
     from surgsim.report.write import write_report
     from surgsim.runs.stop import Stopped
 
-    _check(options)
+    metric_named(options.metric)  # it is needed after the runs alone
     suite, folder = _suite(options)
     out = options.out or Path("runs") / "suites" / suite.name
     batch = Batch(
         suite=suite,
         folder=folder,
         out=out,
-        jobs=_jobs(options.jobs),
+        jobs=workers_for(options.jobs),
         resume=options.resume,
         shard=_shard(options.shard),
         command="surgsim " + shlex.join(sys.argv[1:]),
     )
     try:
         with redirect_stdout(sys.stderr), show_batch_progress(suite.name) as report:  # ray prints warnings
-            table = compare(batch, report, _runner(options))
+            table = compare(batch, report, runner_of(options.engine, options.address))
         if table is None:
             print_prose(
                 f"{out}: other shards' runs are missing; --resume makes the table once they are there"
@@ -103,70 +98,17 @@ def _tell_broken(table: Any) -> int:
     return 1
 
 
-def _check(options: argparse.Namespace) -> None:
-    """Refuse what would only be found wrong after the runs.
-
-    Raises:
-        SurgsimError: If there is such a thing.
-    """
-    from surgsim.compare.observations import metric_named
-    from surgsim.errors import SurgsimError
-
-    metric_named(options.metric)
-    if options.address and options.engine != "ray":
-        raise SurgsimError("--address is for --engine ray")
-
-
 def _suite(options: argparse.Namespace):  # type: ignore[no-untyped-def]
     """The suite that the command line means, and the folder of its relative paths."""
+    from surgsim.compare.choice import suite_named
     from surgsim.compare.matters import parse_matters
-    from surgsim.compare.suite import ad_hoc_suite, is_suite, load_suite, with_changes
-    from surgsim.errors import SurgsimError
+    from surgsim.compare.suite import with_changes
 
-    names, controllers = (
-        options.names,
-        None if options.controllers is None else options.controllers.split(","),
-    )
-    _check_name(names[0])
-    if is_suite(names[0]):
-        if len(names) > 1:
-            raise SurgsimError("give one suite, or scenarios; not both")
-        suite, folder = load_suite(names[0])
-    else:
-        suite, folder = ad_hoc_suite(names, None), Path()
-    changed = with_changes(
-        suite,
-        controllers,
-        options.seeds,
-        options.record,
-        options.assignments,
-        parse_matters(options.matters),
-    )
+    controllers = None if options.controllers is None else options.controllers.split(",")
+    suite, folder = suite_named(options.names)
+    matters = parse_matters(options.matters)
+    changed = with_changes(suite, controllers, options.seeds, options.record, options.assignments, matters)
     return changed, folder
-
-
-def _check_name(name: str) -> None:
-    """Refuse a name that is neither a shipped suite's nor a scenario's, and no path.
-
-    Raises:
-        SurgsimError: If it is such a name.
-    """
-    from surgsim.errors import SurgsimError, unknown_name
-    from surgsim.scenario.load import shipped
-
-    known = [*shipped("suites"), *shipped()]
-    if name not in known and len(Path(name).parts) < 2 and not Path(name).suffix:
-        raise SurgsimError(f"{unknown_name(name, 'shipped suite or scenario', known)} Or give a .yaml file.")
-
-
-def _jobs(jobs: int | None) -> int:
-    from surgsim.errors import SurgsimError
-
-    if jobs is None:
-        return len(os.sched_getaffinity(0))
-    if jobs < 1:
-        raise SurgsimError(f"--jobs: {jobs} is not allowed: must be 1 or more")
-    return jobs
 
 
 def _shard(text: str) -> tuple[int, int]:
@@ -177,17 +119,6 @@ def _shard(text: str) -> tuple[int, int]:
     if not 1 <= i <= n <= MOST_SHARDS:
         raise SurgsimError(f"--shard: '{text[:60]}' is not I/N with 1 <= I <= N <= {MOST_SHARDS}")
     return i, n
-
-
-def _runner(options: argparse.Namespace):  # type: ignore[no-untyped-def]
-    """What runs the jobs."""
-    if options.engine == "local":
-        from surgsim.compare.workers import run_jobs
-
-        return run_jobs
-    from surgsim.compare.ray_engine import ray_runner
-
-    return ray_runner(options.address)
 
 
 def _print(table: Any, options: argparse.Namespace, matters: Mapping[str, float]) -> None:

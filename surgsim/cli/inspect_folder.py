@@ -58,14 +58,11 @@ def check_finished(path: Path) -> None:
     Raises:
         SurgsimError: If it is one, with the command that goes on with it.
     """
+    from surgsim.compare.unfinished import unfinished
     from surgsim.errors import SurgsimError
 
-    if (path / "suite.json").is_file() and not (path / "runs.parquet").is_file():
-        runs = len(list(path.glob("runs/*/*/*/metrics.json")))
-        raise SurgsimError(
-            f"{path}: the batch is not finished: {runs} run{'' if runs == 1 else 's'} there, no table yet. "
-            f"To go on: {_command_again(path, '--resume')}"
-        )
+    if told := unfinished(path):
+        raise SurgsimError(f"{path}: {told}. To go on: {_command_again(path, '--resume')}")
 
 
 def _command_again(path: Path, *flags: str) -> str:
@@ -106,9 +103,9 @@ def run_of(path: Path, run_id: str) -> Path:
 
 def list_batch(path: Path, as_json: bool) -> None:
     """Print the runs of the batch in `path`."""
-    from surgsim.cli.output import format_number
     from surgsim.cli.table import print_prose, print_table
     from surgsim.compare.table import read_table
+    from surgsim.display import number
     from surgsim.metrics.catalog import METRICS
 
     rows = read_table(path).to_pylist()
@@ -116,7 +113,7 @@ def list_batch(path: Path, as_json: bool) -> None:
         print(json.dumps(rows, indent=2))
         return
     shown = ("tip_error_rms_mm", "rcm_error_rms_mm", "rcm_error_max_mm")
-    table = [(row["run_id"], row["outcome"], *(format_number(row[name]) for name in shown)) for row in rows]
+    table = [(row["run_id"], row["outcome"], *(number(row[name]) for name in shown)) for row in rows]
     header = ("run", "outcome", *(METRICS[name].heading for name in shown))
     print_table(f"{len(rows)} runs of {path}", header, table, right=(2, 3, 4), whole=True)
     if any(row["recording"] for row in rows):

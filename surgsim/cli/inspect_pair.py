@@ -46,8 +46,8 @@ def inspect_two(paths: list[Path], options: argparse.Namespace) -> int:
 
 
 def _print_pair(paths: list[Path], pair: "list[Recorded]", as_json: bool) -> None:
-    from surgsim.cli.output import format_number
     from surgsim.cli.table import print_prose, print_table
+    from surgsim.display import number
     from surgsim.metrics.catalog import METRICS, compute_metrics
 
     a, b = (compute_metrics(recorded.trace) for recorded in pair)
@@ -68,9 +68,9 @@ def _print_pair(paths: list[Path], pair: "list[Recorded]", as_json: bool) -> Non
         print("The scenarios are the same.")
     print()
     shown = [name for name in METRICS if a[name] is not None or b[name] is not None]
-    table = [(name, *(format_number(values[name]) for values in (a, b, gaps))) for name in shown]
+    table = [(name, *(number(values[name]) for values in (a, b, gaps))) for name in shown]
     print_table("Metrics", ("metric", "a", "b", "b - a"), table, right=(1, 2, 3))
-    largest = format_number(largest_gap_mm(pair[0].trace, pair[1].trace))
+    largest = number(largest_gap_mm(pair[0].trace, pair[1].trace))
     print(f"\nlargest distance between the two tips: {largest} mm")
 
 

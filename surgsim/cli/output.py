@@ -1,6 +1,5 @@
 """Tables and progress as a person reads them: data on stdout, progress on stderr."""
 
-import math
 import sys
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -14,23 +13,13 @@ from rich.text import Text
 from surgsim.cli.kernels import on_screen
 from surgsim.cli.table import fit_prose, print_prose, print_table, terminal_width
 from surgsim.compiled.watch import working_time
+from surgsim.display import number
 from surgsim.simulate.loop import Progress as ProgressCall
 
 if TYPE_CHECKING:
     from surgsim.compare.intervals import Interval
     from surgsim.compare.leaderboard import LeaderboardRow
     from surgsim.trace.trace import Trace
-
-
-def format_number(value: float | None, digits: int = 4) -> str:
-    """A figure with `digits` significant digits; a dash where it is not defined."""
-    if value is None or math.isnan(value):
-        return "-"
-    if value == 0.0:
-        return "0"
-    if 1e-3 <= abs(value) < 1e5:
-        return f"{value:.{max(0, digits - 1 - math.floor(math.log10(abs(value))))}f}"
-    return f"{value:.{digits - 1}e}"
 
 
 def print_paragraphs(lines: Sequence[str]) -> None:
@@ -50,7 +39,7 @@ def print_metrics(title: str, metrics: Mapping[str, float | None]) -> None:
 
     shown = [group for group in GROUPS if any(metrics.get(metric.name) is not None for metric in group)]
     rows = [
-        (metric.name, format_number(metrics[metric.name], metric.digits), metric.meaning)
+        (metric.name, number(metrics[metric.name], metric.digits), metric.meaning)
         for group in shown
         for metric in group
         if metric.name in metrics
@@ -76,7 +65,7 @@ def show_progress(label: str, quiet: bool = False) -> Iterator[ProgressCall | No
     if quiet:
         yield None
     elif sys.stderr.isatty():
-        yield from _bar(label)
+        yield from _run_bar(label)
     else:
         yield _Lines(label)
 
@@ -95,24 +84,34 @@ class _Description(ProgressColumn):
         return text
 
 
-def _bar(label: str) -> Iterator[ProgressCall]:
+@contextmanager
+def _bar(label: str) -> Iterator[Callable[[float, float, str], None]]:
+    """A bar; what is yielded takes how far it is, the whole, and the same in words."""
     columns = (
         _Description(),
         BarColumn(_BAR),
         TextColumn("{task.fields[reached]}"),
         TimeRemainingColumn(),
     )
-    began = working_time()
     with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task(label, total=None, reached="")
 
-        def update(reached_s: float, duration_s: float) -> None:
-            factor = f"{reached_s / max(working_time() - began, 1e-9):.1f}x real time"
-            reached = f"{reached_s:.1f}/{duration_s:.1f} s  {factor}"
-            bar.update(task, description=label, completed=reached_s, total=duration_s, reached=reached)
+        def update(done: float, total: float, reached: str) -> None:
+            bar.update(task, description=label, completed=done, total=total, reached=reached)
 
         with on_screen(lambda text: bar.update(task, description=text)):
             yield update
+
+
+def _run_bar(label: str) -> Iterator[ProgressCall]:
+    began = working_time()
+    with _bar(label) as bar:
+
+        def update(reached_s: float, duration_s: float) -> None:
+            factor = f"{reached_s / max(working_time() - began, 1e-9):.1f}x real time"
+            bar(reached_s, duration_s, f"{reached_s:.1f}/{duration_s:.1f} s  {factor}")
+
+        yield update
 
 
 class _Lines:
@@ -141,24 +140,15 @@ def show_batch_progress(label: str) -> Iterator[Callable[[int, int, str], None]]
 
 
 def _batch_bar(label: str) -> Iterator[Callable[[int, int, str], None]]:
-    columns = (
-        _Description(),
-        BarColumn(_BAR),
-        TextColumn("{task.fields[reached]}"),
-        TimeRemainingColumn(),
-    )
     failed = 0
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task(label, total=None, reached="")
+    with _bar(label) as bar:
 
         def update(done: int, total: int, outcome: str) -> None:
             nonlocal failed
             failed += outcome != "completed"
-            reached = f"{done}/{total} runs" + (f"  {failed} failed" if failed else "")
-            bar.update(task, description=label, completed=done, total=total, reached=reached)
+            bar(done, total, f"{done}/{total} runs" + (f"  {failed} failed" if failed else ""))
 
-        with on_screen(lambda text: bar.update(task, description=text)):
-            yield update
+        yield update
 
 
 class _BatchLines:
@@ -189,8 +179,8 @@ def print_leaderboard(metric: str, rows: "Sequence[LeaderboardRow]", points: int
         if figure.value is None:
             return "-"
         if figure.low is None or figure.high is None:
-            return format_number(figure.value)
-        return f"{format_number(figure.value)} [{format_number(figure.low)}, {format_number(figure.high)}]"
+            return number(figure.value)
+        return f"{number(figure.value)} [{number(figure.low)}, {number(figure.high)}]"
 
     from surgsim.compare.failures import counted_outcomes
     from surgsim.metrics.catalog import METRICS
@@ -199,7 +189,7 @@ def print_leaderboard(metric: str, rows: "Sequence[LeaderboardRow]", points: int
         undone = f"{row.not_done} not done" if row.not_done else ""
         failed = ", ".join(filter(None, (counted_outcomes(row.failures), undone))) or "none"
         place = str(row.place or "-")
-        rank = format_number(row.rank.value, 3)
+        rank = number(row.rank.value, 3)
         return (place, row.controller, failed, str(row.runs), interval(row.value), rank)
 
     table = [cells(row) for row in rows]

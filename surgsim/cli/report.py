@@ -3,6 +3,7 @@
 import argparse
 
 from surgsim.cli.paths import path_argument
+from surgsim.cli.scenario_options import add_matters
 
 HELP = "write one HTML page about a batch"
 EXAMPLES = """The page needs nothing but itself: it opens from disk, offline, on a phone and in print. Its
@@ -21,13 +22,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--out", type=path_argument, metavar="FILE", help="file to write; default DIR/report.html"
     )
-    parser.add_argument(
-        "--matters",
-        action="append",
-        default=[],
-        metavar="METRIC=VALUE",
-        help="smallest difference that matters",
-    )
+    add_matters(parser)
     parser.add_argument("--json", action="store_true", help="print JSON")
 
 

@@ -24,6 +24,17 @@ def add_settings(parser: argparse.ArgumentParser, text: str) -> None:
     )
 
 
+def add_matters(parser: argparse.ArgumentParser) -> None:
+    """`--matters`."""
+    parser.add_argument(
+        "--matters",
+        action="append",
+        default=[],
+        metavar="METRIC=VALUE",
+        help="smallest difference that matters",
+    )
+
+
 def naming_file(name: str, error: SurgsimError) -> SurgsimError:
     """`error` with the scenario as it was given, where it names only what the scenario calls itself."""
     if isinstance(error, ScenarioError) or str(error).startswith(f"{name}: "):

@@ -90,7 +90,7 @@ def terminal_width(file: TextIO) -> int:
 
 def fit_prose(text: str, width: int) -> Lines:
     """`text` in lines of at most `width`, broken between words; a longer word has a line of its own."""
-    lines = textwrap.wrap(text, width, break_long_words=False, break_on_hyphens=False)
+    lines = textwrap.wrap(text, max(1, width), break_long_words=False, break_on_hyphens=False)
     return lines or [""]
 
 

@@ -26,6 +26,7 @@ def execute(options: argparse.Namespace) -> int:
 
     from surgsim.cli.table import print_table
     from surgsim.contract.package import check_package
+    from surgsim.display import count
 
     results = check_package(options.package)
     broken = [result for result in results if not result.passed]
@@ -34,7 +35,7 @@ def execute(options: argparse.Namespace) -> int:
     else:
         rows = [(f"{r.kind} {r.part}", r.check, r.detail if not r.passed else "holds") for r in results]
         parts = len({(r.kind, r.part) for r in results})
-        counted = f"{parts} part{'s' if parts != 1 else ''}, {len(results)} checks"
+        counted = f"{count(parts, 'part')}, {count(len(results), 'check')}"
         title = f"{options.package}: {counted}, {len(broken) or 'none'} broken"
         print_table(title, ("part", "promise", "result"), rows)
     return 1 if broken else 0

@@ -71,11 +71,14 @@ def compare(batch: Batch, report: Report | None = None, runner: Runner = run_job
     i, n = batch.shard
     ours = everything[i - 1 :: n]
     others: list[str] = []
-    jobs = [
-        Job(scenario_json=scenario.model_dump_json(), folder=str(batch.out / row.folder), record=spec.record)
-        for row, scenario, spec in ours
-        if not _is_to_be_kept(batch.out / row.folder, scenario, spec.record, others)
-    ]
+    kept: set[str] = set()
+    jobs = []
+    for row, scenario, spec in ours:
+        folder = batch.out / row.folder
+        if _is_to_be_kept(folder, scenario, spec.record, others):
+            kept.add(row.folder)
+        else:
+            jobs.append(Job(scenario_json=scenario.model_dump_json(), folder=str(folder), record=spec.record))
     count = len(ours)
     if others:
         told = f"{len(others)} of {count} runs were made by other code ({others[0]}) and are run again"
@@ -83,7 +86,8 @@ def compare(batch: Batch, report: Report | None = None, runner: Runner = run_job
     for done, result in enumerate(runner(jobs, batch.jobs), start=count - len(jobs) + 1):
         if report is not None:
             report(done, count, result.outcome)
-    if any(not is_whole(batch.out / row.folder, scenario, spec.record) for row, scenario, spec in everything):
+    rest = [(row, scenario, spec) for row, scenario, spec in everything if row.folder not in kept]
+    if any(not is_whole(batch.out / row.folder, scenario, spec.record) for row, scenario, spec in rest):
         return None
     return write_table(batch.out, rows)
 

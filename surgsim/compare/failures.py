@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from surgsim.compare.observations import Mask, Observations
-from surgsim.compare.wording import heading_of, listed, with_unit
+from surgsim.compare.wording import counted, heading_of, listed, with_unit
 from surgsim.metrics.accuracy import CONVERGED_RCM_M
 from surgsim.metrics.catalog import METRICS
 
@@ -38,14 +38,24 @@ class Failing:
 
 def failing(runs: Observations) -> list[Failing]:
     """Where each controller fails, failures first; those that fail in the same respects are together."""
-    groups: dict[tuple[str, ...], list[str]] = {}
+    groups: dict[tuple[str, ...], dict[str, _Seen]] = {}
     for name in runs.controllers:
-        groups.setdefault(tuple(_respects(runs.of_controller(name))), []).append(name)
+        mine = runs.of_controller(name)
+        seen = _Seen(runs=mine, masks=_respects(mine))
+        groups.setdefault(tuple(seen.masks), {})[name] = seen
     found = [
-        Failing(controllers=tuple(names), text=_told(runs, names, respects), bad=bool(respects))
-        for respects, names in groups.items()
+        Failing(controllers=tuple(group), text=_told(list(group.values()), respects), bad=bool(respects))
+        for respects, group in groups.items()
     ]
     return sorted(found, key=lambda one: not one.bad)
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Seen:
+    """Runs of one controller, and for each respect in which some fail, which do."""
+
+    runs: Observations
+    masks: Mapping[str, Mask]
 
 
 def outcome_words(name: str) -> str:
@@ -55,8 +65,7 @@ def outcome_words(name: str) -> str:
 
 def counted_outcomes(counts: Mapping[str, int]) -> str:
     """`2 rcm limit, 1 diverged`, the most frequent first."""
-    items = sorted(counts.items(), key=lambda item: (-item[1], item[0]))
-    return ", ".join(f"{count} {outcome_words(name)}" for name, count in items if count)
+    return counted({outcome_words(name): count for name, count in counts.items()})
 
 
 def _respects(runs: Observations) -> dict[str, Mask]:
@@ -68,12 +77,11 @@ def _respects(runs: Observations) -> dict[str, Mask]:
     return {respect: mask for respect, mask in found.items() if mask.any()}
 
 
-def _told(runs: Observations, names: Sequence[str], respects: Sequence[str]) -> str:
+def _told(each: Sequence[_Seen], respects: Sequence[str]) -> str:
     """What is to be said of controllers that fail in these respects."""
-    each = [runs.of_controller(name) for name in names]
     if not respects:
-        done = " and did its task" if all(bool((one.success == 1.0).all()) for one in each) else ""
-        count = "every run" if any(len(one) > 1 for one in each) else "the run"
+        done = " and did its task" if all(bool((one.runs.success == 1.0).all()) for one in each) else ""
+        count = "every run" if any(len(one.runs) > 1 for one in each) else "the run"
         return f"nowhere, {count} completed{done}, and no threshold was exceeded"
     parts = [_unfinished(respect, each) for respect in respects if respect in (_FAILED, _NOT_DONE)]
     past: dict[str, list[str]] = {}
@@ -84,35 +92,34 @@ def _told(runs: Observations, names: Sequence[str], respects: Sequence[str]) -> 
     return "; ".join(parts)
 
 
-def _unfinished(respect: str, each: Sequence[Observations]) -> str:
+def _unfinished(respect: str, each: Sequence[_Seen]) -> str:
     """In how many runs the end was not reached, and how those ended; or the task was not done."""
     if respect == _NOT_DONE:
         return f"completed, task not done in {_share(respect, each)}"
-    ends = Counter(outcome for runs in each for outcome in runs.outcome[~runs.completed].tolist())
+    ends = Counter(outcome for one in each for outcome in one.runs.outcome[one.masks[_FAILED]].tolist())
     return f"failed in {_share(respect, each)} ({counted_outcomes(ends)})"
 
 
-def _share(respect: str, each: Sequence[Observations]) -> str:
+def _share(respect: str, each: Sequence[_Seen]) -> str:
     """In how many runs of each controller it fails in one respect, and in which scenarios."""
-    masks = [_respects(runs)[respect] for runs in each]
     completed = respect not in (_FAILED, _NOT_DONE)
-    totals = {int(runs.completed.sum()) if completed else len(runs) for runs in each}
-    counts = sorted({int(mask.sum()) for mask in masks})
+    totals = {int(one.runs.completed.sum()) if completed else len(one.runs) for one in each}
+    counts = sorted({int(one.masks[respect].sum()) for one in each})
     share = f"{counts[0]} to {counts[-1]}" if len(counts) > 1 else f"{counts[0]}"
     share += f" of {totals.pop()}" if len(totals) == 1 else ""
-    return share + (" each" if len(each) > 1 else "") + _where(each, masks)
+    return share + (" each" if len(each) > 1 else "") + _where(respect, each)
 
 
-def _worst(metric: str, each: Sequence[Observations]) -> str:
+def _worst(metric: str, each: Sequence[_Seen]) -> str:
     """The metric and its largest value in completed runs."""
     words, unit = heading_of(METRICS[metric])
-    worst = max(float(np.nanmax(runs.values(metric))) for runs in each)
+    worst = max(float(np.nanmax(one.runs.values(metric))) for one in each)
     return f"{words} (up to {with_unit(worst, unit)})"
 
 
-def _where(each: Sequence[Observations], masks: Sequence[Mask]) -> str:
-    """The scenarios of some runs, unless they are all of them."""
-    there = [name for runs, mask in zip(each, masks, strict=True) for name in runs.scenario[mask].tolist()]
-    every = {name for runs in each for name in runs.scenarios}
+def _where(respect: str, each: Sequence[_Seen]) -> str:
+    """The scenarios of the runs that fail in one respect, unless they are all of them."""
+    there = [name for one in each for name in one.runs.scenario[one.masks[respect]].tolist()]
+    every = {name for one in each for name in one.runs.scenarios}
     found = list(dict.fromkeys(there))
     return "" if len(found) == len(every) else f", in {listed(found)}"

@@ -13,6 +13,7 @@ from pydantic import AfterValidator, Field, FiniteFloat, field_validator, model_
 
 from surgsim.catalog import Name, PartConfig
 from surgsim.compare.axis import AxisConfig, Values
+from surgsim.compare.matters import checked_matters
 from surgsim.errors import ScenarioError, SurgsimError, unknown_name
 from surgsim.metrics.catalog import METRICS
 from surgsim.scenario.load import find, load_scenario, shipped
@@ -291,14 +292,15 @@ def with_changes(
     """`suite` with what the command line says instead; its `key.path=value` settings hold in every run.
 
     Raises:
-        ScenarioError: If the seeds cannot be read, or a setting is of a key that the suite itself varies.
+        SurgsimError: If the seeds cannot be read, a setting is of a key that the suite itself varies, or a
+            smallest difference is not allowed.
     """
     for setting in settings:
         _check_setting(suite, setting)
     changes: dict[str, Any] = {
         "record": suite.record or record,
         "settings": (*suite.settings, *settings),
-        "matters": {**suite.matters, **(matters or {})},
+        "matters": {**suite.matters, **checked_matters(matters or {})},
     }
     if controllers is not None:
         changes["controllers"] = tuple(_from_here(name) for name in controllers)

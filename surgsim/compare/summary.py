@@ -63,6 +63,9 @@ def _first(runs: Observations, metric: Metric, rows: Sequence[LeaderboardRow]) -
     winners = tuple(row.controller for row in ordered if row.place == 1)
     others = [row for row in ordered if row.place != 1]
     if not others or not winners:
+        if len(valued) == 1:
+            value = with_unit(valued[0].value.value, unit)
+            return (), f"{valued[0].controller} alone has a value of {words}: {value}."
         last = compare_pair(runs, valued[0].controller, valued[-1].controller, metric.name)
         return (), f"Nobody wins by {words}: no controller is told apart. First and last: {last.sentence}"
     found = compare_pair(runs, winners[0], others[0].controller, metric.name)

@@ -2,7 +2,7 @@
 
 import hashlib
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -12,6 +12,7 @@ import pyarrow.csv
 import pyarrow.parquet
 
 from surgsim.compare.job import OUTCOMES
+from surgsim.compare.unfinished import unfinished
 from surgsim.errors import SurgsimError, unknown_name
 from surgsim.metrics.catalog import METRICS
 from surgsim.metrics.timing import TIMING_METRICS
@@ -106,23 +107,29 @@ def write_table(root: Path, rows: Sequence[Row]) -> pa.Table:
     parts = [_part(root, row) for row in rows]
     table = pa.Table.from_batches(parts, schema=schema())
     # The Parquet file is last: with it the batch is finished. Two shards may end at the same time.
-    for name, write in ((CSV, pa.csv.write_csv), (PARQUET, pa.parquet.write_table)):
-        content = pa.BufferOutputStream()
-        write(sealed_table(table), content)
-        with replacing(root / name) as draft:
-            write_file(draft, content.getvalue().to_pybytes())
+    _write(root / CSV, table, pa.csv.write_csv)
+    _write(root / PARQUET, sealed_table(table), pa.parquet.write_table)
     return table
+
+
+def _write(path: Path, table: pa.Table, write: Callable[[pa.Table, Any], None]) -> None:
+    content = pa.BufferOutputStream()
+    write(table, content)
+    with replacing(path) as draft:
+        write_file(draft, content.getvalue().to_pybytes())
 
 
 def read_table(root: Path) -> pa.Table:
     """The table of a results folder.
 
     Raises:
-        SurgsimError: If there is none, or it is not one of surgsim's.
+        SurgsimError: If there is none, the batch is not finished, or the table is not one of surgsim's.
     """
     path = root / PARQUET
+    if told := unfinished(root):
+        raise SurgsimError(f"{root}: {told}")
     if not path.is_file():
-        raise SurgsimError(f"{root} holds no {PARQUET}: it is no folder of batch results, or not finished")
+        raise SurgsimError(f"{root} holds no {PARQUET}: it is no folder of batch results")
     try:
         table = pa.parquet.read_table(path, partitioning=None, page_checksum_verification=True)
         table.validate(full=True)

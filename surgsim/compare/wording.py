@@ -4,6 +4,7 @@ import math
 from collections.abc import Mapping, Sequence
 
 from surgsim.compare.intervals import Interval
+from surgsim.display import count
 from surgsim.metrics.metric import Metric
 
 
@@ -29,11 +30,6 @@ def bracket(interval: Interval, digits: int = 3) -> str:
     return f"[{number(interval.low, digits)}, {number(interval.high, digits)}]"
 
 
-def plural(count: int, noun: str) -> str:
-    """`1 seed`, `2 seeds`."""
-    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
-
-
 def heading_of(metric: Metric) -> tuple[str, str]:
     """A metric's heading without its unit, and the unit; the latter is empty for a pure number."""
     words, _, unit = metric.heading.partition(" [")
@@ -53,9 +49,9 @@ def with_unit(value: float | None, unit: str, digits: int = 3) -> str:
 def seeds_of(sizes: Sequence[int]) -> str:
     """How many seeds each scenario has: `20 seeds in each of 2 scenarios`."""
     if len(sizes) == 1:
-        return plural(sizes[0], "seed")
+        return count(sizes[0], "seed")
     if len(set(sizes)) == 1:
-        return f"{plural(sizes[0], 'seed')} in each of {len(sizes)} scenarios"
+        return f"{count(sizes[0], 'seed')} in each of {len(sizes)} scenarios"
     return f"{min(sizes)} to {max(sizes)} seeds in each of {len(sizes)} scenarios" if sizes else "no seed"
 
 
@@ -69,4 +65,4 @@ def listed(names: Sequence[str], most: int = 4) -> str:
 def counted(counts: Mapping[str, int]) -> str:
     """`2 rcm_limit, 1 diverged`, the most frequent first."""
     items = sorted(counts.items(), key=lambda item: (-item[1], item[0]))
-    return ", ".join(f"{count} {name}" for name, count in items if count)
+    return ", ".join(f"{times} {name}" for name, times in items if times)

@@ -2,11 +2,12 @@
 
 import multiprocessing
 import os
+import sys
 import threading
 import time
 from collections import deque
 from collections.abc import Iterator, Sequence
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from multiprocessing.connection import Connection, wait
 from pathlib import Path
@@ -82,7 +83,8 @@ class _Pool:
         """Start a process, and give it the next job."""
         here, there = _SPAWN.Pipe()
         process = _SPAWN.Process(target=_serve, args=(there,), daemon=True)
-        with held_back():  # Ctrl-C reaches every process of a terminal: not one that cannot take it yet
+        # Ctrl-C reaches every process of a terminal: not one that cannot take it yet.
+        with held_back(), _script_hidden():
             process.start()
         there.close()
         worker = _Worker(process, here)
@@ -170,6 +172,21 @@ class _Pool:
                 folder = Path(self.jobs[worker.index].folder)
                 with suppress(OSError):
                     clear_drafts(folder.parent, folder.name)
+
+
+@contextmanager
+def _script_hidden() -> Iterator[None]:
+    """Keep a new process from running the caller's script again: workers need nothing of it.
+
+    So a script without `if __name__ == "__main__"` can start them.
+    """
+    main = vars(sys.modules["__main__"])
+    hidden: dict[str, Any] = {name: main.pop(name) for name in ("__file__", "__spec__") if name in main}
+    main["__spec__"] = None
+    try:
+        yield
+    finally:
+        main.update(hidden)
 
 
 def stopped(text: str) -> SurgsimError:

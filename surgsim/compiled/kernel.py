@@ -48,7 +48,7 @@ def _kernel(function: Function, signatures: tuple[Any, ...]) -> Function:
         return function
     dispatcher: Any = made
     dispatcher._cache = KernelCache(dispatcher)  # as `cache=True` would set numba's own
-    declare(dispatcher)
+    declare()
     if signatures:
         with register_dispatcher(dispatcher):
             for signature in signatures:

@@ -1,16 +1,12 @@
 """One process compiles a kernel, the others wait for it: two workers do not do the same twice."""
 
+import fcntl
 import os
 import threading
 import time
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
-
-try:
-    import fcntl
-except ImportError:  # Windows: each process compiles for itself
-    fcntl = None  # type: ignore[assignment]
 
 _PATIENCE_S = 300.0
 _PAUSE_S = 0.02
@@ -44,8 +40,6 @@ class CompileLock:
 
         Where a file system knows no locks, or somebody holds one for too long, it goes on without.
         """
-        if fcntl is None:
-            return
         until = time.monotonic() + _PATIENCE_S
         with suppress(OSError):
             self._handle = os.open(self._path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)

@@ -56,7 +56,7 @@ def _candidates() -> Iterator[Path]:
         yield home / "kernels"
     scratch = _temporary_folder()
     if scratch is not None:
-        yield scratch / f"surgsim-kernels-{_user()}"
+        yield scratch / f"surgsim-kernels-{os.getuid()}"
 
 
 def _temporary_folder() -> Path | None:
@@ -67,11 +67,7 @@ def _temporary_folder() -> Path | None:
         return None
     named = [os.environ.get(name, "") for name in ("TMPDIR", "TEMP", "TMP")]
     usual = {os.path.abspath(path) for path in (*named, "/tmp", "/var/tmp", "/usr/tmp") if path}
-    return found if os.name == "nt" or str(found) in usual else None
-
-
-def _user() -> str:
-    return str(os.getuid()) if hasattr(os, "getuid") else "user"
+    return found if str(found) in usual else None
 
 
 def _is_ours(place: Path) -> bool:
@@ -82,4 +78,4 @@ def _is_ours(place: Path) -> bool:
         return False
     if not stat.S_ISDIR(found.st_mode):
         return False
-    return not hasattr(os, "getuid") or (found.st_uid == os.geteuid() and not found.st_mode & 0o022)
+    return found.st_uid == os.geteuid() and not found.st_mode & 0o022

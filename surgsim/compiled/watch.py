@@ -32,7 +32,7 @@ class _OwnTime(threading.local):
 _counts, _own = _Counts(), _OwnTime()
 
 
-def declare(dispatcher: Any) -> None:
+def declare() -> None:
     """Count a kernel that may have to be compiled."""
     _counts.declared += 1
 

@@ -2,8 +2,8 @@
 
 import contextlib
 from pathlib import Path
-from time import perf_counter
 
+from surgsim.compiled.watch import working_time
 from surgsim.errors import SurgsimError
 from surgsim.live import gamepad, keyboard
 from surgsim.live.controls import Controls, Device
@@ -48,9 +48,9 @@ def operate(
         return _live(scenario, operator, folder, record)
     recorder = Recorder(source_of(Path(operator)))
     simulation = _start(scenario, recorder)[1]
-    began = perf_counter()
+    began = working_time()
     trace = simulation.run(progress)
-    return _written(scenario, trace, recorder, perf_counter() - began, folder, record)
+    return _written(scenario, trace, recorder, working_time() - began, folder, record)
 
 
 def _live(scenario: Scenario, operator: str, folder: Path, record: bool) -> RunResult:
@@ -66,9 +66,9 @@ def _live(scenario: Scenario, operator: str, folder: Path, record: bool) -> RunR
         held.enter_context(signals_end(controls))
         setup, simulation = _start(scenario, recorder)
         with Window(setup, keys) as window:
-            began = perf_counter()
+            began = working_time()
             trace = drive(setup, simulation, controls, window, Pace(), help)
-        return _written(scenario, trace, recorder, perf_counter() - began, folder, record)
+        return _written(scenario, trace, recorder, working_time() - began, folder, record)
 
 
 def _start(scenario: Scenario, source: Source) -> tuple[Setup, Simulation]:

@@ -11,6 +11,7 @@ from surgsim.control.self_motion import SelfMotion, SelfMotionPoint
 from surgsim.metrics.metric import CHOICE, Metric, Undefined
 from surgsim.models.arm import ArmModel
 from surgsim.models.config import SceneConfig
+from surgsim.spatial import nearest_on_line
 from surgsim.trace.trace import Trace
 
 Array = NDArray[np.float64]
@@ -54,7 +55,7 @@ def attainable_manipulability(
         q, p_WT = trace.block("q")[row], trace.block("tip")[row]
         p_WC = None if centres is None else centres[row]
         if k == 0:
-            here, points = _search(scene, _bytes(q), _bytes(p_WT), None if p_WC is None else _bytes(p_WC))
+            points = _search(scene, _bytes(q), _bytes(p_WT), None if p_WC is None else _bytes(p_WC))
         else:
             here = manifold.project(q, p_WT, p_WC)
             starts = (*followed, here)
@@ -96,11 +97,7 @@ def _centres(trace: Trace) -> Array | None:
     """The shaft's points nearest to the trocar (rows, 3) [m]; None without a trocar."""
     if trace.meta.scenario.get("trocar") is None:
         return None
-    tip = trace.block("tip")
-    axis = trace.block("wrist") - tip
-    axis = axis / np.linalg.norm(axis, axis=1, keepdims=True)
-    centres: Array = tip + np.sum((trace.block("trocar") - tip) * axis, axis=1, keepdims=True) * axis
-    return centres
+    return nearest_on_line(trace.block("trocar"), trace.block("wrist"), trace.block("tip"))
 
 
 def _distinct(points: Sequence[SelfMotionPoint], manifold: SelfMotion) -> list[SelfMotionPoint]:
@@ -113,10 +110,8 @@ def _distinct(points: Sequence[SelfMotionPoint], manifold: SelfMotion) -> list[S
 
 
 @lru_cache(maxsize=256)
-def _search(
-    scene: str, q: bytes, p_WT: bytes, p_WC: bytes | None
-) -> tuple[SelfMotionPoint, tuple[SelfMotionPoint, ...]]:
-    """The point of the manifold next to `q`, and the optima that can be reached from it.
+def _search(scene: str, q: bytes, p_WT: bytes, p_WC: bytes | None) -> tuple[SelfMotionPoint, ...]:
+    """The optima that can be reached from the point of the manifold next to `q`.
 
     The runs of a batch that differ in seed, controller or disturbance share scene and start. This is a
     function of its arguments alone, so a run's metric does not depend on the runs before it.
@@ -124,7 +119,7 @@ def _search(
     manifold = _manifold_of(scene)
     tip, trocar = _array(p_WT), None if p_WC is None else _array(p_WC)
     here = manifold.project(_array(q), tip, trocar)
-    return here, tuple(manifold.optima(here, tip, trocar, _STARTS))
+    return tuple(manifold.optima(here, tip, trocar, _STARTS))
 
 
 def _bytes(a: Array) -> bytes:

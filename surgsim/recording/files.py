@@ -6,6 +6,7 @@ place, by a system call that says so at once.
 
 import contextlib
 import fcntl
+import glob
 import os
 import uuid
 from collections.abc import Iterator
@@ -83,7 +84,7 @@ def release(handle: int) -> None:
 
 def _clear(path: Path) -> None:
     """Remove temporary siblings of `path` that no process holds."""
-    for left in path.parent.glob(f".{_literal(path.name)}.*{_SUFFIX}"):
+    for left in path.parent.glob(f".{glob.escape(path.name)}.*{_SUFFIX}"):
         with contextlib.suppress(OSError):  # gone, or another user's
             handle = os.open(left, os.O_RDWR)
             try:
@@ -91,11 +92,6 @@ def _clear(path: Path) -> None:
                     left.unlink()
             finally:
                 release(handle)
-
-
-def _literal(name: str) -> str:
-    """`name` as a pattern that matches it alone."""
-    return "".join(f"[{letter}]" if letter in "*?[" else letter for letter in name)
 
 
 def _remove(path: Path) -> None:

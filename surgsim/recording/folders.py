@@ -15,11 +15,7 @@ def sync_tree(folder: Path) -> None:
     """
     for path, _, names in os.walk(folder):
         for name in names:
-            handle = os.open(os.path.join(path, name), os.O_RDONLY)
-            try:
-                os.fsync(handle)
-            finally:
-                os.close(handle)
+            _sync(Path(path) / name)
         sync_folder(Path(path))
 
 
@@ -44,11 +40,15 @@ def sync_folder(folder: Path) -> None:
         OSError: If the disk refuses.
     """
     try:
-        handle = os.open(folder, os.O_RDONLY)
-        try:
-            os.fsync(handle)
-        finally:
-            os.close(handle)
+        _sync(folder)
     except OSError as error:
         if error.errno not in _CANNOT:
             raise
+
+
+def _sync(path: Path) -> None:
+    handle = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)

@@ -3,7 +3,6 @@
 import json
 import os
 import subprocess
-import sys
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,6 +12,7 @@ import numpy as np
 from surgsim.errors import RecordingError
 from surgsim.recording.framing import check_framing, recording_file
 from surgsim.recording.layout import Header
+from surgsim.resources import run_module
 from surgsim.trace.trace import BASE_BLOCKS, Array, Trace
 
 _TIMEOUT_S = 120.0
@@ -62,10 +62,8 @@ def _fault(header: Header) -> str:
 
 def _extract(file: Path) -> bytes:
     """What `surgsim.recording.extract`, run as a program of its own, says of the file."""
-    command = [sys.executable, "-P", "-m", "surgsim.recording.extract", str(file)]
-    paths = {**os.environ, "PYTHONPATH": os.pathsep.join(entry or os.getcwd() for entry in sys.path)}
     try:
-        done = subprocess.run(command, env=paths, capture_output=True, timeout=_TIMEOUT_S, check=False)
+        done = run_module("surgsim.recording.extract", str(file), timeout_s=_TIMEOUT_S)
     except subprocess.TimeoutExpired as error:
         raise RecordingError(f"{file}: damaged recording: not read after {_TIMEOUT_S:g} s") from error
     if done.returncode != 0:

@@ -13,6 +13,7 @@ from surgsim.recording import palette
 from surgsim.recording.layout import SCENE, TIMELINE, timestamps
 from surgsim.recording.shapes import Triangles, geom_triangles, joined
 from surgsim.scenario.schema import Scenario
+from surgsim.spatial import nearest_on_line
 from surgsim.trace.trace import Array, Trace
 
 RCM_ARROW_SCALE = 20.0
@@ -201,15 +202,9 @@ def _log_points(
 def rcm_errors(tip: Array, wrist: Array, trocar: Array) -> Array:
     """Vectors (n, 3) [m] from the trocar to the nearest point of the shaft's axis.
 
-    p_CCp = (p - p_C) - d dᵀ(p - p_C), d the axis' direction, p any of its points.
-
     Args:
         tip: One point of the axis (n, 3) [m].
         wrist: Another (n, 3) [m].
         trocar: Remote centre of motion (n, 3) [m].
     """
-    axis = tip - wrist
-    axis = axis / np.linalg.norm(axis, axis=1, keepdims=True)
-    offset = tip - trocar
-    nearest: Array = offset - np.sum(offset * axis, axis=1, keepdims=True) * axis
-    return nearest
+    return nearest_on_line(trocar, wrist, tip) - trocar

@@ -3,6 +3,7 @@
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -55,17 +56,17 @@ class Results:
         """What the batch is called."""
         return str(self.suite.get("name") or self.folder.resolve().name)
 
-    @property
+    @cached_property
     def metrics(self) -> list[str]:
         """Metrics that any completed run has."""
         return [name for name in METRICS if np.isfinite(self.runs.values(name)).any()]
 
-    @property
+    @cached_property
     def headline(self) -> list[str]:
         """Metrics that are ranked and compared in pairs."""
         return [name for name in _HEADLINE if name in self.metrics] or self.metrics[:1]
 
-    @property
+    @cached_property
     def shown(self) -> list[str]:
         """Metrics drawn for each scenario without unfolding."""
         return [name for name in _SHOWN if name in self.metrics]
@@ -83,7 +84,16 @@ def read_results(folder: Path, matters: Mapping[str, float] | None = None) -> Re
     """
     if not folder.is_dir():
         raise SurgsimError(f"{folder} is not a folder; give the one that `surgsim compare` wrote")
-    table, suite = read_table(folder), _suite(folder / "suite.json")
+    return results_of(folder, read_table(folder), matters)
+
+
+def results_of(folder: Path, table: Any, matters: Mapping[str, float] | None = None) -> Results:
+    """As `read_results`, where the folder's `table` is at hand, as `read_table` gives it.
+
+    Raises:
+        SurgsimError: If it is not one of batch results, or `suite.json` cannot be read.
+    """
+    suite = _suite(folder / "suite.json")
     told = suite.get("matters")
     smallest = {**(told if isinstance(told, Mapping) else {}), **(matters or {})}
     try:

@@ -14,11 +14,12 @@ from typing import Any
 import numpy as np
 
 from surgsim.errors import SurgsimError
+from surgsim.models.arm import ArmModel
 from surgsim.models.build import build
 from surgsim.models.picture import render
 from surgsim.scenario.load import load_scenario
 from surgsim.scenario.schema import Scenario
-from surgsim.simulate.setup import prepare
+from surgsim.simulate.setup import beginning
 
 MOST = 2
 """Scenes that are drawn: the first of each robot."""
@@ -43,8 +44,9 @@ def main(asked: Mapping[str, Any]) -> list[dict[str, Any]]:
 
 def _scene(scenario: Scenario, *, draw: bool) -> dict[str, Any]:
     """Points of the arm at its start, the port, the tip's path, and a picture as JPEG in base64."""
-    setup = prepare(scenario)
-    kin = setup.arm.kinematics(setup.q_start)
+    arm = ArmModel(scenario.scene)
+    q_start, task = beginning(scenario, arm)
+    kin = arm.kinematics(q_start)
     trocar = scenario.trocar
     return {
         "scenario": scenario.name,
@@ -53,8 +55,8 @@ def _scene(scenario: Scenario, *, draw: bool) -> dict[str, Any]:
         "joints": _points(kin.anchors_W),
         "tip": kin.p_WT.tolist(),
         "trocar": None if trocar is None else list(trocar.position_m),
-        "path": _points([point for _, point in setup.task.reach()]),
-        "picture": _picture(scenario, setup.q_start) if draw else None,
+        "path": _points([point for _, point in task.reach()]),
+        "picture": _picture(scenario, q_start) if draw else None,
     }
 
 

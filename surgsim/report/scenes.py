@@ -3,14 +3,13 @@
 import json
 import os
 import subprocess
-import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from pathlib import Path
 from typing import Any
 
 from surgsim.report.results import Results
+from surgsim.resources import run_module
 
 _LONGEST_S = 120.0
 Point = tuple[float, float, float]
@@ -56,12 +55,15 @@ def _source(results: Results, name: str) -> str:
 @lru_cache(maxsize=64)
 def look(scenarios: tuple[str, ...]) -> tuple[SceneView, ...]:
     """Scenes of scenarios, given by name or path."""
-    tried = [(True, environment) for environment in _environments()] + [(False, dict(os.environ))]
-    for draw, environment in tried:
-        found = _ask({"scenarios": scenarios, "draw": draw}, environment)
-        if found is not None and (not draw or all(scene["picture"] for scene in found)):
-            return tuple(_view(scene) for scene in found)
-    return ()
+    undrawn = None
+    for environment in _environments():
+        found = _ask({"scenarios": scenarios, "draw": True}, environment)
+        if found is not None and all(scene["picture"] for scene in found):
+            return tuple(map(_view, found))
+        undrawn = undrawn or found
+    if undrawn is None:  # every process that was to draw was lost
+        undrawn = _ask({"scenarios": scenarios, "draw": False}, dict(os.environ))
+    return tuple(map(_view, undrawn or ()))
 
 
 def _environments() -> list[dict[str, str]]:
@@ -72,22 +74,15 @@ def _environments() -> list[dict[str, str]]:
 
 def _ask(asked: dict[str, Any], environment: dict[str, str]) -> list[dict[str, Any]] | None:
     """The answer of the process that draws; None where it fails or takes too long."""
-    command = [sys.executable, "-m", "surgsim.report.scene_process"]
-    root = str(Path(__file__).parents[2])
-    paths = [root, environment.get("PYTHONPATH", "")]
     try:
-        done = subprocess.run(
-            command,
-            input=json.dumps(asked),
-            env={**environment, "PYTHONPATH": os.pathsep.join(path for path in paths if path)},
-            capture_output=True,
-            text=True,
-            encoding="utf-8",
-            timeout=_LONGEST_S,
-            check=True,
+        done = run_module(
+            "surgsim.report.scene_process",
+            timeout_s=_LONGEST_S,
+            given=json.dumps(asked).encode(),
+            environment=environment,
         )
-        answer = json.loads(done.stdout)
-    except (OSError, subprocess.SubprocessError, ValueError):
+        answer = json.loads(done.stdout) if done.returncode == 0 else None
+    except (OSError, subprocess.TimeoutExpired, ValueError):
         return None
     return answer if isinstance(answer, list) else None
 

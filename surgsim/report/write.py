@@ -6,7 +6,7 @@ from pathlib import Path
 
 from surgsim.recording.files import replacing, write_file
 from surgsim.report.page import page
-from surgsim.report.results import read_results
+from surgsim.report.results import Results, read_results
 from surgsim.report.scenes import scenes_of
 from surgsim.report.series import read_series
 
@@ -37,10 +37,19 @@ def write_report(
     Raises:
         SurgsimError: If there are no results, they are damaged, or the disk refuses.
     """
-    root = Path(folder)
-    results = read_results(root, matters)
-    file = root / NAME if out is None else Path(out)
-    series = read_series(root, results.rows, results.runs.scenarios, say)
+    return write_page(read_results(Path(folder), matters), out, say)
+
+
+def write_page(
+    results: Results, out: str | os.PathLike[str] | None = None, say: Callable[[str], None] = _silent
+) -> Path:
+    """As `write_report`, where the results have been read.
+
+    Raises:
+        SurgsimError: If the disk refuses.
+    """
+    file = results.folder / NAME if out is None else Path(out)
+    series = read_series(results.folder, results.rows, results.runs.scenarios, say)
     text = page(results, series, scenes_of(results), file)
     with replacing(file) as draft:
         write_file(draft, text)

@@ -5,6 +5,7 @@ draft which nobody locks is left over from a dead one. This holds across contain
 """
 
 import os
+import re
 import shutil
 import tempfile
 from collections.abc import Iterator
@@ -49,17 +50,18 @@ def clear_drafts(parent: Path, name: str = "") -> None:
 def hidden(parent: Path, name: str, suffix: str) -> list[Path]:
     """Names in `parent` like `.name.something` and `suffix`, of any `name` if it is empty.
 
-    A folder that may be written to but not listed shows none.
+    Something holds no dot: `.v1.1.x.part` belongs to `v1.1`, and not to `v1`. A folder that may be written to
+    but not listed shows none.
 
     Raises:
         OSError: If the disk refuses.
     """
-    start = f".{name}." if name else "."
+    form = re.compile(rf"\.{re.escape(name) if name else '.+'}\.[^.]+{re.escape(suffix)}", re.DOTALL)
     try:
         names = os.listdir(parent)
     except PermissionError:
         return []
-    return [parent / found for found in names if found.startswith(start) and found.endswith(suffix)]
+    return [parent / found for found in names if form.fullmatch(found)]
 
 
 def remove_tree(folder: Path) -> None:

@@ -46,13 +46,14 @@ def check_magnitudes(document: YamlDocument) -> None:
         ScenarioError: For the first one.
     """
     for path, value in _numbers(document.tree):
-        unit, most = _bound(path)
+        ending = unit_of(path)
+        unit, most = UNITS[ending] if ending else ("", MOST)
         if value and not LEAST <= abs(value) <= most:
+            number = f"a number in {unit}" if unit else "a number"
             reason = (
-                f"{value:g} is not allowed: the size of a number{unit} must be 0, or from "
-                f"{LEAST:g} to {most:g}"
+                f"{value:g} is not allowed: the size of {number} must be 0, or from {LEAST:g} to {most:g}"
             )
-            far = unit == f" in {UNITS['m'][0]}" and abs(value) > most
+            far = ending == "m" and abs(value) > most
             remark = "; what is farther away cannot be reached" if far else ""
             raise ScenarioError(document.where(path), reason + remark)
 
@@ -73,12 +74,3 @@ def unit_of(path: KeyPath) -> str | None:
     words = key.split("_")
     endings = ("_".join(words[i:]) for i in range(1, len(words)))
     return next((ending for ending in endings if ending in UNITS), None)
-
-
-def _bound(path: KeyPath) -> tuple[str, float]:
-    """What to call the unit, and the largest size."""
-    unit = unit_of(path)
-    if unit is None:
-        return "", MOST
-    name, most = UNITS[unit]
-    return f" in {name}", most

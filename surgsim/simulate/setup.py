@@ -53,9 +53,8 @@ def prepare(scenario: Scenario) -> Setup:
     """
     parts = scenario.build_parts()
     arm = ArmModel(scenario.scene)
-    q_start = _start_of(_start_key(scenario))
+    q_start, task = beginning(scenario, arm)
     period = scenario.simulation.control_period_s
-    task = _build_task(scenario, _path_start(scenario, arm))
     _check_length(scenario, task)
     _check_beginnings(scenario, task)
     try:
@@ -79,6 +78,17 @@ def prepare(scenario: Scenario) -> Setup:
         controller=controller,
         q_start=q_start,
     )
+
+
+def beginning(scenario: Scenario, arm: ArmModel) -> tuple[Array, Task]:
+    """Start configuration (7,) [rad], and the task, of a scenario whose nominal arm is `arm`.
+
+    Raises:
+        UnreachableError: If start or path cannot be reached through the trocar.
+        SurgsimError: If the task enters a port and there is none, or starts beside it.
+    """
+    q_start = _start_of(_start_key(scenario))
+    return q_start, _build_task(scenario, _path_start(scenario, arm))
 
 
 def _build_task(scenario: Scenario, start: Array) -> Task:

@@ -27,6 +27,7 @@ def test_the_public_names_are_these_and_each_is_found():
     assert set(surgsim.__all__) <= set(dir(surgsim))
     for name in surgsim.__all__:
         assert getattr(surgsim, name) is getattr(surgsim, name)
+    assert len(dir(surgsim)) == len(set(dir(surgsim))), "a name is listed twice once it was used"
 
 
 def test_an_unknown_name_is_an_attribute_error():

@@ -5,6 +5,7 @@ import signal
 import subprocess
 import sys
 import time
+from contextlib import contextmanager
 
 import pandas as pd
 import pytest
@@ -77,6 +78,38 @@ def test_without_out_the_results_live_as_long_as_the_object(quick, tmp_path, mon
     assert not folder.exists()
 
 
+def test_a_run_keeps_the_folder_it_is_read_from(quick):
+    found = surgsim.compare("circle_lwr4plus", controllers="pinv", jobs=1, record=True, **quick)
+    folder, run = found.folder, found["circle_lwr4plus/pinv/base-seed0"]
+    del found
+    assert run.trace["t_s"][-1] == pytest.approx(0.3)
+    assert folder.is_dir()
+    del run
+    assert not folder.exists()
+
+
+def test_the_table_is_not_read_again(batch, monkeypatch):
+    found = surgsim.read(batch)
+    monkeypatch.setattr("surgsim.report.results.read_table", lambda folder: pytest.fail("read again"))
+    assert found.controllers == ["pinv", "qp"]
+    assert len(found.leaderboard()) == 2
+    assert found.report() == batch / "report.html"
+
+
+def test_the_caller_s_script_is_hidden_only_while_a_process_starts(quick, tmp_path, monkeypatch):
+    main, seen = sys.modules["__main__"], []
+    before = (main.__spec__, getattr(main, "__file__", None))
+
+    @contextmanager
+    def shown(label):
+        yield lambda *_: seen.append((main.__spec__, getattr(main, "__file__", None)))
+
+    monkeypatch.setattr("surgsim.api.comparing.show_batch_progress", shown)
+    options = {"controllers": "pinv", "jobs": 1, "out": tmp_path / "out", "progress": True}
+    surgsim.compare("circle_lwr4plus", **options, **quick)
+    assert seen == [before]
+
+
 def test_a_batch_goes_on_and_one_of_other_settings_is_refused(batch, quick, tmp_path):
     out = tmp_path / "batch"
     shutil.copytree(batch, out)
@@ -125,6 +158,9 @@ def test_scenarios_and_controllers_are_taken_as_content_too(quick, tmp_path):
         ({"controllers": []}, "give controllers; the list is empty"),
         ({"controllers": [3]}, "a int is no controller: give a name, a path or a mapping"),
         ({"matters": {"tip": 1.0}}, "'tip' is not a metric. Known"),
+        ({"matters": {"sparc": -1}}, "--matters: 'sparc=-1' is not METRIC=VALUE with a value of 0 or more"),
+        ({"matters": {"sparc": float("nan")}}, "--matters: 'sparc=nan' is not METRIC=VALUE with a value"),
+        ({"matters": {"sparc": "1"}}, "--matters: 'sparc=1' is not METRIC=VALUE with a value of 0 or more"),
         ({"controllers": ["vprn"]}, "--controller: 'vprn' is not a shipped controller. Known"),
     ],
 )
@@ -137,7 +173,7 @@ def test_bad_options_are_refused_before_anything_runs(options, text):
 def test_a_suite_cannot_be_mixed_with_scenarios():
     with pytest.raises(surgsim.SurgsimError, match=r"^give one suite, or scenarios; not both$"):
         surgsim.compare(["quick", "circle_lwr4plus"])
-    with pytest.raises(ScenarioError, match=r"'circl' is not a shipped scenario"):
+    with pytest.raises(ScenarioError, match=r"^'circl' is not a shipped suite or scenario"):
         surgsim.compare("circl")
 
 
@@ -156,6 +192,7 @@ def test_what_is_neither_run_nor_batch_says_what_is_missing(tmp_path, batch, fol
     unfinished = tmp_path / "unfinished"
     shutil.copytree(batch, unfinished)
     (unfinished / "runs.parquet").unlink()
+    shutil.copytree(unfinished / "runs" / RUN, (unfinished / "runs" / RUN).with_name(".base-seed9.x.part"))
     with pytest.raises(surgsim.SurgsimError, match=r"the batch is not finished: 4 runs there, no table yet"):
         surgsim.read(unfinished)
     damaged = tmp_path / "damaged"

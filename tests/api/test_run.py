@@ -204,6 +204,23 @@ def test_a_folder_that_holds_something_else_is_refused_before_the_run(tmp_path):
         surgsim.run("circle_lwr4plus", out=tmp_path)
 
 
+def test_a_folder_that_is_filled_during_the_run_is_not_replaced(quick, tmp_path, monkeypatch):
+    thesis = tmp_path / "run" / "thesis.tex"
+
+    @contextmanager
+    def filling(label):
+        def report(t_s, duration_s):
+            thesis.parent.mkdir(exist_ok=True)
+            thesis.write_text("mine")
+
+        yield report
+
+    monkeypatch.setattr("surgsim.api.running.show_progress", filling)
+    with pytest.raises(surgsim.SurgsimError, match=r"holds 'thesis.tex', which is not a run's"):
+        surgsim.run("circle_lwr4plus", out=thesis.parent, progress=True, **quick)
+    assert thesis.read_text() == "mine"
+
+
 def test_progress_is_the_command_s_and_only_on_request(quick, monkeypatch, capfd):
     reached = []
 

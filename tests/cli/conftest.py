@@ -38,10 +38,10 @@ class Typed:
     screen: int
     output: bytearray = field(default_factory=bytearray)
 
-    def wait(self, timeout_s=200.0, until=lambda: False):
-        """Read what it writes, until it ends or `until()`."""
+    def wait(self, timeout_s=200.0, until=None):
+        """Read what it writes, until it ends, or until `until()`, which it must not end before."""
         end = time.monotonic() + timeout_s
-        while not until():
+        while not (until and until()):
             assert time.monotonic() < end, f"it does not end:\n{self.text}"
             if not select.select([self.screen], [], [], 0.02)[0]:
                 continue
@@ -53,6 +53,7 @@ class Typed:
                 self.process.wait(timeout=60)
                 break
             self.output += piece
+        assert until is None or until(), f"it has ended before:\n{self.text}"
         return self
 
     def press(self, keys):

@@ -8,25 +8,19 @@ import sys
 from pathlib import Path
 
 import pytest
+from batches import short_run
 
 from surgsim.cli.main import main
 from surgsim.compare.job import CRASHED, WORKER_DIED, do, write_failure
 from surgsim.compare.table import read_table
 from surgsim.compare.workers import Done
 
-SUITE = """\
+SUITE = f"""\
 name: tiny
 scenarios: [circle_lwr4plus]
 controllers: [pinv, vprnn]
 seeds: "0:2"
-settings:
-  - theatre=false
-  - task.duration_s=0.2
-  - task.ramp_s=0.1
-  - task.hold_start_s=0
-  - task.hold_end_s=0
-  - task.radius_m=0.002
-  - "disturbances=[{type: payload, spread: 0.5}]"
+settings: {json.dumps([*short_run(), "disturbances=[{type: payload, spread: 0.5}]"])}
 """
 RUN_LINE = r"tiny: 4 of 4 runs, 0 failed, about 0 s to go"
 
@@ -161,19 +155,16 @@ def test_a_batch_with_crashed_runs_is_no_success(capsys, monkeypatch, tmp_path):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "tiny.yaml").write_text(SUITE)
 
-    def runner(options):
-        def run(jobs, count):
-            ends = [CRASHED, "completed", WORKER_DIED, "completed"]
-            for index, (job, end) in enumerate(zip(jobs, ends, strict=True)):
-                if end == "completed":
-                    yield Done(index=index, outcome=do(job))
-                else:
-                    write_failure(job.scenario(), Path(job.folder), end, "by the test")
-                    yield Done(index=index, outcome=end)
+    def run(jobs, count):
+        ends = [CRASHED, "completed", WORKER_DIED, "completed"]
+        for index, (job, end) in enumerate(zip(jobs, ends, strict=True)):
+            if end == "completed":
+                yield Done(index=index, outcome=do(job))
+            else:
+                write_failure(job.scenario(), Path(job.folder), end, "by the test")
+                yield Done(index=index, outcome=end)
 
-        return run
-
-    monkeypatch.setattr("surgsim.cli.compare._runner", runner)
+    monkeypatch.setattr("surgsim.compare.choice.run_jobs", run)
     assert main(["compare", "tiny.yaml"]) == 1
     error = capsys.readouterr().err.splitlines()
     assert error[-1] == (

@@ -76,3 +76,8 @@ def test_bash_completes(terminal, tmp_path):
     ):
         bash.press(keys)
         bash.wait(until=lambda shown=shown: shown in bash.text, timeout_s=60)
+
+
+def test_a_shell_that_has_ended_is_not_waited_for_as_if_it_had_answered(terminal):
+    with pytest.raises(AssertionError, match="it has ended before"):
+        terminal(shutil.which("true")).wait(until=lambda: False)

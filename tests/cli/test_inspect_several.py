@@ -7,16 +7,15 @@ from pathlib import Path
 
 import pyarrow as pa
 import pytest
+from batches import Here, short_run
 from rerun.chunk import RrdReader
 
 from surgsim.cli.inspect_pair import differing, largest_gap_mm
 from surgsim.cli.main import main
-from surgsim.cli.output import format_number
 from surgsim.compare.engine import Batch, compare
-from surgsim.compare.job import do
 from surgsim.compare.suite import SuiteConfig
 from surgsim.compare.table import read_table
-from surgsim.compare.workers import Done
+from surgsim.display import number
 from surgsim.metrics.catalog import METRICS
 from surgsim.metrics.timing import TIMING_METRICS
 from surgsim.recording.layout import HEADER, SERIES, TIMELINE
@@ -24,14 +23,6 @@ from surgsim.recording.read import read_recording
 from surgsim.recording.sealed import read_sealed, sealed
 from surgsim.trace.trace import Trace
 
-SETTINGS = (
-    "theatre=false",
-    "task.duration_s=0.2",
-    "task.ramp_s=0.1",
-    "task.hold_start_s=0",
-    "task.hold_end_s=0",
-    "task.radius_m=0.002",
-)
 A, B = "circle_lwr4plus/pinv/base-seed0", "circle_lwr4plus/joint_impedance/base-seed0"
 
 
@@ -44,14 +35,10 @@ def batch(tmp_path_factory) -> Path:
         scenarios=("circle_lwr4plus",),
         controllers=("pinv", "joint_impedance"),
         record=True,
-        settings=SETTINGS,
+        settings=short_run(),
     )
 
-    def here(jobs, count):
-        for index, job in enumerate(jobs):
-            yield Done(index=index, outcome=do(job))
-
-    assert compare(Batch(suite=suite, folder=Path(), out=out), runner=here) is not None
+    assert compare(Batch(suite=suite, folder=Path(), out=out), runner=Here()) is not None
     return out
 
 
@@ -159,7 +146,7 @@ def test_what_is_wrong_is_one_line(batch, runs, capsys, tmp_path):
         f"'nothing' is not a run of {batch}. Known: {B}, {A}.": [str(batch), "--run", "nothing"],
         "inspect takes one recording, two, or a batch's folder": [*runs, runs[0]],
         "--export takes one recording": [*runs, "--export", str(tmp_path / "x.parquet")],
-        f"{runs[0]} holds no runs.parquet: it is no folder of batch results, or not finished": [
+        f"{runs[0]} holds no runs.parquet: it is no folder of batch results": [
             runs[0],
             "--run",
             A,
@@ -249,7 +236,7 @@ def test_a_batch_without_recordings_says_how_to_record_them(copy, listed, capsys
 @pytest.mark.parametrize(("gap_m", "text"), [(0.0, "0"), (3e-17, "3.000e-14"), (0.002, "2.000")])
 def test_the_distance_of_the_tips_is_told_however_small(runs, gap_m, text):
     still, moved = (tip_traces(read_recording(Path(runs[0])).trace, x) for x in (0.0, gap_m))
-    assert format_number(largest_gap_mm(still, moved)) == text
+    assert number(largest_gap_mm(still, moved)) == text
 
 
 def test_ticks_at_which_a_tip_is_not_finite_do_not_count(runs):

@@ -8,17 +8,11 @@ import time
 from pathlib import Path
 
 import pytest
+from batches import short_run
 
 from surgsim.compare.table import read_table
 from surgsim.runs.stop import Stopped, stopping_in_order
 
-SHORT = [
-    "theatre=false",
-    "task.ramp_s=0.1",
-    "task.hold_start_s=0",
-    "task.hold_end_s=0",
-    "task.radius_m=0.002",
-]
 LONG_RUN = ["run", "circle_lwr4plus", "--out", "out/run", "--set", "task.duration_s=20"]
 FILES = {"scenario.yaml", "metrics.json", "recording.rrd"}
 
@@ -31,10 +25,6 @@ def surgsim(terminal):
         return terminal(sys.executable, "-m", "surgsim", *words, **options)
 
     return start
-
-
-def words(*more):
-    return [word for setting in (*SHORT, *more) for word in ("--set", setting)]
 
 
 def draft_in(folder):
@@ -82,7 +72,9 @@ def test_what_a_killed_run_left_goes_with_the_next(surgsim, tmp_path):
     os.killpg(typed.process.pid, signal.SIGKILL)
     typed.process.wait()
     assert [path.suffix for path in (tmp_path / "out").iterdir()] == [".part"]
-    done = surgsim("run", "circle_lwr4plus", "--out", "out/run", *words("task.duration_s=0.2")).wait()
+    done = surgsim(
+        "run", "circle_lwr4plus", "--out", "out/run", *(f"--set={setting}" for setting in short_run())
+    ).wait()
     assert done.status == 0, done.text
     assert [path.name for path in (tmp_path / "out").iterdir()] == ["run"]
     assert {path.name for path in (tmp_path / "out" / "run").iterdir()} == FILES

@@ -6,16 +6,10 @@ import sys
 from pathlib import Path
 
 import pytest
+from batches import short_run
 
 ROOT = Path(__file__).resolve().parents[2]
-SHORT = (
-    "--set=theatre=false",
-    "--set=task.duration_s=0.3",
-    "--set=task.ramp_s=0.1",
-    "--set=task.hold_start_s=0",
-    "--set=task.hold_end_s=0",
-    "--set=task.radius_m=0.002",
-)
+SHORT = tuple(f"--set={setting}" for setting in short_run(0.3))
 
 
 def surgsim(*words, cwd, strict=True, **variables):

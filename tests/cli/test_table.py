@@ -26,6 +26,11 @@ def test_every_word_of_a_table_is_there_whole_and_no_line_is_too_wide(rows, widt
     assert not headings or not added, "a row holds its cells and nothing else"
 
 
+@pytest.mark.parametrize("width", [1, 0, -7])
+def test_without_room_every_word_has_a_line_of_its_own(width):
+    assert fit_prose("no room at all", width) == ["no", "room", "at", "all"]
+
+
 ROW = ("circle_lwr4plus/pinv/base-seed0", "0.0449", "1.50", "the tip left its path by more than allowed")
 
 

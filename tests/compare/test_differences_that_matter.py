@@ -1,5 +1,6 @@
 """The smallest difference that matters: in verdicts, ranks, scores and places."""
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -7,7 +8,7 @@ import pytest
 
 from surgsim.compare.aggregates import ranks, scores
 from surgsim.compare.leaderboard import leaderboard
-from surgsim.compare.matters import parse_matters
+from surgsim.compare.matters import checked_matters, parse_matters
 from surgsim.compare.places import places_of
 from surgsim.compare.statistics import compare_pair
 from surgsim.compare.suite import SuiteConfig, with_changes
@@ -140,6 +141,36 @@ def test_the_command_line_says_what_matters():
         assert str(caught.value) == f"--matters: '{text}' is not METRIC=VALUE with a value of 0 or more"
     with pytest.raises(SurgsimError, match="'rcm_error' is not a metric"):
         parse_matters(["rcm_error=1"])
+
+
+@pytest.mark.parametrize(
+    ("value", "said"),
+    [
+        (-1, "-1"),
+        (-1e-9, "-1e-09"),
+        (math.nan, "nan"),
+        (math.inf, "inf"),
+        ("0.5", "0.5"),
+        ("much", "much"),
+        (None, "None"),
+        (True, "True"),
+    ],
+)
+def test_what_is_no_number_of_zero_or_more_does_not_matter(value, said):
+    suite = SuiteConfig(name="s", scenarios=("circle_lwr4plus",))
+    text = f"--matters: 'sparc={said}' is not METRIC=VALUE with a value of 0 or more"
+    for judge in (checked_matters, lambda given: with_changes(suite, None, None, False, matters=given)):
+        with pytest.raises(SurgsimError) as caught:
+            judge({"sparc": value})
+        assert str(caught.value) == text
+
+
+def test_numbers_of_numpy_matter_too():
+    found = checked_matters({"sparc": np.float64(0.5), "rcm_error_rms_mm": np.int64(2)})
+    assert found == {"sparc": 0.5, "rcm_error_rms_mm": 2.0}
+    assert {type(value) for value in found.values()} == {float}
+    with pytest.raises(SurgsimError, match=r"^--matters: a str is no mapping of metrics to numbers$"):
+        checked_matters("sparc=1")
 
 
 def test_a_suite_says_what_matters():

@@ -14,23 +14,18 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from batches import Here, short_run
 
 from surgsim.compare.engine import Batch, compare
-from surgsim.compare.job import DiskError, do
+from surgsim.compare.job import DiskError
 from surgsim.compare.suite import SuiteConfig
 from surgsim.compare.table import MACHINE_COLUMNS, read_table
-from surgsim.compare.workers import Done, run_jobs
+from surgsim.compare.workers import run_jobs
 from surgsim.errors import SurgsimError
+from surgsim.recording.contents import fault_of
 from surgsim.recording.sealed import read_sealed, sealed
 
-SHORT = (
-    "theatre=false",
-    "task.duration_s=0.2",
-    "task.ramp_s=0.1",
-    "task.hold_start_s=0",
-    "task.hold_end_s=0",
-    "task.radius_m=0.002",
-)
+SHORT = short_run()
 SUITE = SuiteConfig(
     name="small",
     scenarios=("circle_lwr4plus",),
@@ -62,33 +57,16 @@ def batch(out, **changes):
     return replace(Batch(suite=SUITE, folder=Path(), out=out), **changes)
 
 
-def here(jobs, count):
-    """Do the jobs in this process."""
-    for index, job in enumerate(jobs):
-        yield Done(index=index, outcome=do(job))
-
-
 def stopping_after(most):
     """A runner that is interrupted after `most` jobs."""
 
     def run(jobs, count):
-        for done in here(jobs, count):
+        for done in Here()(jobs, count):
             if done.index >= most:
                 raise KeyboardInterrupt
             yield done
 
     return run
-
-
-class Counting:
-    """A runner that notes the folders of the jobs it was given."""
-
-    def __init__(self):
-        self.folders = []
-
-    def __call__(self, jobs, count):
-        self.folders += [job.folder for job in jobs]
-        yield from here(jobs, count)
 
 
 def same(a, b):
@@ -101,7 +79,7 @@ def same(a, b):
 def whole(tmp_path_factory):
     """Folder of the uninterrupted batch."""
     out = tmp_path_factory.mktemp("whole") / "results"
-    compare(batch(out), runner=here)
+    compare(batch(out), runner=Here())
     return out
 
 
@@ -146,9 +124,9 @@ def test_what_is_whole_is_kept_and_what_is_missing_is_run(whole, tmp_path):
     with pytest.raises(KeyboardInterrupt):
         compare(batch(out), runner=stopping_after(3))
     assert not (out / "runs.parquet").exists()
-    made = {path.parent: path.stat().st_mtime_ns for path in out.glob("runs/*/*/*/metrics.json")}
+    made = {path.parent: path.stat().st_mtime_ns for path in out.glob("runs/*/*/[!.]*/metrics.json")}
     assert len(made) == 4, "the fourth was written, its answer never read"
-    runner, seen = Counting(), []
+    runner, seen = Here(), []
     table = compare(batch(out, resume=True), lambda *now: seen.append(now), runner)
     assert len(runner.folders) == 4
     assert not {Path(folder) for folder in runner.folders} & set(made)
@@ -201,7 +179,7 @@ def test_other_code_is_named(copy, whole, capsys):
     provenance = read_sealed(folder / "metrics.json")["provenance"]
     change(folder, "packages", {**provenance["packages"], "mujoco": "3.0.0", "rerun-sdk": "0.1"})
     change(folder, "code_sha256", "0" * 64)
-    compare(batch(copy, resume=True), runner=Counting())
+    compare(batch(copy, resume=True), runner=Here())
     now = provenance["packages"]["mujoco"]
     count = read_table(whole).num_rows
     told = f"1 of {count} runs were made by other code (mujoco 3.0.0 not {now}) and are run again"
@@ -236,7 +214,7 @@ def test_other_code_is_named(copy, whole, capsys):
 def test_what_is_not_whole_or_not_of_this_code_is_run_again(copy, whole, spoil):
     folder = copy / read_table(whole)["folder"][2].as_py()
     spoil(folder)
-    runner = Counting()
+    runner = Here()
     table = compare(batch(copy, resume=True), runner=runner)
     assert runner.folders == [str(folder)]
     assert same(table, read_table(whole))
@@ -248,30 +226,42 @@ def test_what_a_killed_run_left_is_neither_counted_nor_kept(copy, whole):
     folder.rename(draft)
     (copy / ".suite.json.x.partial").write_text("half")
     (copy / ".runs.parquet.x.partial").write_text("half")
-    runner = Counting()
+    runner = Here()
     table = compare(batch(copy, resume=True), runner=runner)
     assert runner.folders == [str(folder)]
     assert same(table, read_table(whole))
     assert not [path for path in copy.rglob(".*")]
 
 
+def test_a_run_that_is_kept_is_read_once(copy, monkeypatch):
+    seen = []
+
+    def counted(folder, summary):
+        seen.append(folder)
+        return fault_of(folder, summary)
+
+    monkeypatch.setattr("surgsim.compare.engine.fault_of", counted)
+    compare(batch(copy, resume=True), runner=Here())
+    assert sorted(seen) == sorted(copy / row["folder"] for row in read_table(copy).to_pylist())
+
+
 def test_a_recording_that_is_wanted_and_missing_is_made(tmp_path):
     suite = SUITE.model_copy(update={"controllers": ("pinv",), "grid": {}, "seeds": "0"})
     out = tmp_path / "out"
-    first = compare(batch(out, suite=suite), runner=here)
-    second = compare(batch(out, suite=suite.model_copy(update={"record": True}), resume=True), runner=here)
+    first = compare(batch(out, suite=suite), runner=Here())
+    second = compare(batch(out, suite=suite.model_copy(update={"record": True}), resume=True), runner=Here())
     assert first["recording"].to_pylist() == [None]
     recording = second["recording"][0].as_py()
     assert recording == "runs/circle_lwr4plus/pinv/base-seed0/recording.rrd"
     assert (out / recording).is_file()
     wanted = batch(out, suite=suite.model_copy(update={"record": True}), resume=True)
-    runner = Counting()
+    runner = Here()
     compare(wanted, runner=runner)
     assert runner.folders == []
     content = (out / recording).read_bytes()
     for damaged in (b"", content[:-1], content[:-1] + bytes([content[-1] ^ 1])):
         (out / recording).write_bytes(damaged)
-        runner = Counting()
+        runner = Here()
         compare(wanted, runner=runner)
         assert runner.folders == [str((out / recording).parent)]
 
@@ -279,11 +269,11 @@ def test_a_recording_that_is_wanted_and_missing_is_made(tmp_path):
 def test_runs_that_cannot_start_are_rows(tmp_path):
     grid = {"task.radius_m": (0.002, 0.2)}
     suite = SUITE.model_copy(update={"controllers": None, "grid": grid, "seeds": "0"})
-    rows = compare(batch(tmp_path / "out", suite=suite), runner=here).to_pylist()
+    rows = compare(batch(tmp_path / "out", suite=suite), runner=Here()).to_pylist()
     assert [row["outcome"] for row in rows] == ["completed", "refused"]
     assert rows[1]["outcome_detail"].startswith("circle_lwr4plus: at t = ")
     assert (rows[1]["tip_error_rms_mm"], rows[1]["outcome_t_s"]) == (None, 0.0)
-    runner = Counting()
+    runner = Here()
     compare(batch(tmp_path / "out", suite=suite, resume=True), runner=runner)
     assert runner.folders == [], "a refused run is whole"
 
@@ -292,20 +282,20 @@ def test_shards_merge_to_the_same_table(whole, tmp_path):
     out = tmp_path / "out"
     folders = []
     for i in (3, 1, 2):
-        runner = Counting()
+        runner = Here()
         table = compare(batch(out, shard=(i, 3)), runner=runner)
         assert (table is None) == (i != 2), "the last to end makes the table"
         folders += runner.folders
     assert len(folders) == len(set(folders)) == 8
     assert same(table, read_table(whole))
-    runner = Counting()
+    runner = Here()
     assert same(compare(batch(out, resume=True), runner=runner), table)
     assert runner.folders == []
 
 
 def test_resuming_after_some_shards_runs_the_rest(whole, tmp_path):
-    out, runner = tmp_path / "out", Counting()
-    assert compare(batch(out, shard=(1, 3)), runner=here) is None
+    out, runner = tmp_path / "out", Here()
+    assert compare(batch(out, shard=(1, 3)), runner=Here()) is None
     table = compare(batch(out, resume=True), runner=runner)
     assert len(runner.folders) == 5
     assert same(table, read_table(whole))
@@ -315,7 +305,7 @@ def test_a_shard_that_begins_while_another_makes_the_folder_is_not_refused(tmp_p
     out = tmp_path / "out"
     out.mkdir()
     (out / ".suite.json.other.part").write_text("half writ")
-    assert compare(batch(out, shard=(2, 8)), runner=here) is None
+    assert compare(batch(out, shard=(2, 8)), runner=Here()) is None
     assert (out / ".suite.json.other.part").exists(), "it is the other shard's"
 
 
@@ -335,7 +325,7 @@ def test_a_shard_that_begins_while_another_makes_the_folder_is_not_refused(tmp_p
 )
 def test_results_that_are_there_are_not_overwritten(copy, whole, changes, message):
     with pytest.raises(SurgsimError) as error:
-        compare(batch(copy, **changes), runner=here)
+        compare(batch(copy, **changes), runner=Here())
     assert str(error.value) == message.format(out=copy)
     assert same(read_table(copy), read_table(whole))
 
@@ -343,7 +333,7 @@ def test_results_that_are_there_are_not_overwritten(copy, whole, changes, messag
 def test_a_foreign_folder_is_refused(tmp_path):
     (tmp_path / "thesis.tex").write_text("mine")
     with pytest.raises(SurgsimError) as error:
-        compare(batch(tmp_path, resume=True), runner=here)
+        compare(batch(tmp_path, resume=True), runner=Here())
     assert str(error.value) == f"{tmp_path} holds files that are not batch results; choose another --out"
     assert [path.name for path in tmp_path.iterdir()] == ["thesis.tex"]
 
@@ -352,21 +342,21 @@ def test_a_foreign_folder_is_refused(tmp_path):
 def test_a_damaged_suite_json_is_refused(copy, text):
     (copy / "suite.json").write_text(text)
     with pytest.raises(SurgsimError) as error:
-        compare(batch(copy, resume=True), runner=here)
+        compare(batch(copy, resume=True), runner=Here())
     assert str(error.value).startswith(f"{copy / 'suite.json'} is damaged: ")
 
 
 def test_an_out_that_is_a_file_is_refused(tmp_path):
     (tmp_path / "out").write_text("")
     with pytest.raises(SurgsimError) as error:
-        compare(batch(tmp_path / "out"), runner=here)
+        compare(batch(tmp_path / "out"), runner=Here())
     assert str(error.value) == f"cannot write {tmp_path / 'out'}: File exists"
 
 
 def test_two_runs_of_one_name_are_refused(tmp_path):
     suite = SUITE.model_copy(update={"controllers": ("vprnn", "vprnn")})
     with pytest.raises(SurgsimError) as error:
-        compare(batch(tmp_path / "out", suite=suite), runner=here)
+        compare(batch(tmp_path / "out", suite=suite), runner=Here())
     assert str(error.value).startswith("two runs of the suite are both 'circle_lwr4plus/vprnn/")
     assert str(error.value).endswith("-seed0': give scenarios and controllers different names")
     assert not (tmp_path / "out").exists()
@@ -385,10 +375,10 @@ def test_a_full_disk_is_an_error_and_the_rest_can_be_run_later(whole, tmp_path, 
 
         patch.setattr("surgsim.runs.exchange.os.rename", rename)
         with pytest.raises(DiskError, match="No space left on device"):
-            compare(batch(out), runner=here)
-    assert len(list(out.glob("runs/*/*/*/metrics.json"))) == 3
+            compare(batch(out), runner=Here())
+    assert len(list(out.glob("runs/*/*/[!.]*/metrics.json"))) == 3
     assert not list(out.rglob(".*.part"))
-    assert same(compare(batch(out, resume=True), runner=here), read_table(whole))
+    assert same(compare(batch(out, resume=True), runner=Here()), read_table(whole))
 
 
 def test_a_disk_that_is_full_when_the_table_is_written(copy, whole, monkeypatch):
@@ -403,10 +393,10 @@ def test_a_disk_that_is_full_when_the_table_is_written(copy, whole, monkeypatch)
     with monkeypatch.context() as patch:
         patch.setattr("surgsim.recording.files.os.replace", refuse)
         with pytest.raises(SurgsimError) as error:
-            compare(batch(copy, resume=True), runner=here)
+            compare(batch(copy, resume=True), runner=Here())
     assert str(error.value) == f"{copy / 'runs.parquet'}: cannot be written: No space left on device"
     assert sorted(path.name for path in copy.iterdir()) == ["runs", "runs.csv", "suite.json"]
-    assert same(compare(batch(copy, resume=True), runner=here), read_table(whole))
+    assert same(compare(batch(copy, resume=True), runner=Here()), read_table(whole))
 
 
 def test_kill_9_of_one_worker_changes_nothing(whole, tmp_path):
@@ -449,14 +439,14 @@ def test_kill_9_of_the_whole_command_at_a_random_moment(whole, tmp_path):
     runs, delay_s = draw.randint(1, 4), draw.uniform(0.0, 0.3)
     command = start(script, out)
     with command:
-        wait_for(lambda: len(list(out.glob("runs/*/*/*/metrics.json"))) >= runs)
+        wait_for(lambda: len(list(out.glob("runs/*/*/[!.]*/metrics.json"))) >= runs)
         time.sleep(delay_s)
         family = Path(f"/proc/{command.pid}/task/{command.pid}/children").read_text(encoding="utf-8").split()
         command.kill()
     wait_for(lambda: not any(alive(pid) for pid in family), 30.0)
     print(f"killed with {runs} runs whole, {delay_s:.3f} s later")
-    kept = {path: path.stat().st_mtime_ns for path in out.glob("runs/*/*/*/metrics.json")}
-    runner = Counting()
+    kept = {path: path.stat().st_mtime_ns for path in out.glob("runs/*/*/[!.]*/metrics.json")}
+    runner = Here()
     table = compare(batch(out, resume=True), runner=runner)
     assert len(runner.folders) == 8 - len(kept)
     assert all(path.stat().st_mtime_ns == when for path, when in kept.items())

@@ -6,22 +6,15 @@ import sys
 from pathlib import Path
 
 import pytest
+from batches import Here, short_run
 
 from surgsim.cli.main import main
 from surgsim.compare import ray_engine
 from surgsim.compare.engine import Batch, compare
-from surgsim.compare.job import Job, attempt, do
+from surgsim.compare.job import Job, attempt
 from surgsim.compare.suite import SuiteConfig
 from surgsim.compare.table import MACHINE_COLUMNS, read_table
-from surgsim.compare.workers import Done
 
-SHORT = (
-    "theatre=false",
-    "task.ramp_s=0.1",
-    "task.hold_start_s=0",
-    "task.hold_end_s=0",
-    "task.radius_m=0.002",
-)
 HEADER = """
 import json, os, signal, sys
 from pathlib import Path
@@ -83,8 +76,7 @@ def suite(seeds, duration_s):
         controllers=("pinv", "vprnn"),
         seeds=seeds,
         settings=(
-            *SHORT,
-            f"task.duration_s={duration_s}",
+            *short_run(duration_s),
             "disturbances=[{type: payload, mass_kg: 0.3, spread: 0.5}]",
         ),
     )
@@ -102,11 +94,6 @@ def run_script(tmp_path):
         return json.loads(said)
 
     return run
-
-
-def here(jobs, count):
-    for index, job in enumerate(jobs):
-        yield Done(index=index, outcome=do(job))
 
 
 def kept(table):
@@ -153,7 +140,7 @@ def test_without_ray_the_message_says_what_to_install(capsys, monkeypatch, tmp_p
 @pytest.mark.needs("ray")
 def test_a_cluster_of_two_nodes_gives_the_table_of_one_process(run_script, tmp_path):
     small = suite("0:2", 0.3)
-    expected = compare(Batch(suite=small, folder=Path(), out=tmp_path / "here"), runner=here)
+    expected = compare(Batch(suite=small, folder=Path(), out=tmp_path / "here"), runner=Here())
     said = run_script(TWO_NODES, small.model_dump_json(), tmp_path / "ray", 1000)
     assert said == {"rows": 4, "killed": 0, "nodes": 2}
     assert kept(read_table(tmp_path / "ray")) == kept(expected)
@@ -163,7 +150,7 @@ def test_a_cluster_of_two_nodes_gives_the_table_of_one_process(run_script, tmp_p
 @pytest.mark.needs("ray")
 def test_two_nodes_one_killed_give_the_table_of_one_process(run_script, tmp_path):
     small = suite("0:3", 20.0)  # a shorter run ends before its worker notices the death of its node
-    expected = compare(Batch(suite=small, folder=Path(), out=tmp_path / "here"), runner=here)
+    expected = compare(Batch(suite=small, folder=Path(), out=tmp_path / "here"), runner=Here())
     said = run_script(TWO_NODES, small.model_dump_json(), tmp_path / "ray", 1)
     assert said == {"rows": 6, "killed": 1, "nodes": 1}
     assert kept(read_table(tmp_path / "ray")) == kept(expected)

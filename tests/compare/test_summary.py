@@ -53,6 +53,12 @@ def test_nobody_wins_where_nothing_sets_them_apart(runs_of):
     )
 
 
+def test_one_that_alone_has_a_value_is_named(runs_of):
+    """The others completed, and the metric is not defined for them: nothing to compare."""
+    found = told(runs_of({"a": seeds(None, None), "b": seeds(1.0, 3.0), "c": seeds(None, None)}))
+    assert (found.winners, found.first) == ((), "b alone has a value of tip error, RMS: 2.00 mm.")
+
+
 def test_one_controller_and_none_that_completed(runs_of):
     assert told(runs_of({"a": seeds(1.0)})).first == "a alone was run: tip error, RMS 1.00 mm."
     lost = told(runs_of({"a": seeds("diverged"), "b": seeds("diverged")}))

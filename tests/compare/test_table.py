@@ -180,8 +180,19 @@ def test_metrics_of_the_wrong_kind_are_an_error_too(results, tmp_path, metrics):
 def test_a_folder_without_a_table(tmp_path):
     with pytest.raises(SurgsimError) as error:
         read_table(tmp_path)
-    text = f"{tmp_path} holds no runs.parquet: it is no folder of batch results, or not finished"
+    text = f"{tmp_path} holds no runs.parquet: it is no folder of batch results"
     assert str(error.value) == text
+
+
+def test_a_batch_without_its_table_says_how_many_runs_are_there_and_counts_no_draft(tmp_path):
+    (tmp_path / "suite.json").write_text("{}")
+    for name in ("base-seed0", "base-seed1", ".base-seed2.abc123.part"):
+        folder = tmp_path / "runs" / "circle" / "pinv" / name
+        folder.mkdir(parents=True)
+        (folder / "metrics.json").write_text("{}")
+    with pytest.raises(SurgsimError) as error:
+        read_table(tmp_path)
+    assert str(error.value) == f"{tmp_path}: the batch is not finished: 2 runs there, no table yet"
 
 
 def test_a_damaged_parquet(table, tmp_path):

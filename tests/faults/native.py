@@ -12,11 +12,12 @@ import sys
 import time
 from pathlib import Path
 
+from batches import Here, short_run
+
 from surgsim.cli.main import main
 from surgsim.compare import engine, job
 from surgsim.compare.engine import Batch, compare
 from surgsim.compare.suite import SuiteConfig, check_runs, expand
-from surgsim.compare.workers import Done
 from surgsim.errors import SurgsimError
 from surgsim.recording.contents import check_contents
 from surgsim.recording.sealed import read_sealed
@@ -26,14 +27,7 @@ TIMEOUT_S = 120.0
 MOST = 2000
 SHIM = ctypes.CDLL(None)
 SHIM.shim_calls.restype = ctypes.c_long
-SHORT = (
-    "theatre=false",
-    "task.duration_s=0.2",
-    "task.ramp_s=0.1",
-    "task.hold_start_s=0",
-    "task.hold_end_s=0",
-    "task.radius_m=0.002",
-)
+SHORT = short_run()
 SUITE = SuiteConfig(
     name="small", scenarios=("circle_lwr4plus",), controllers=("pinv",), seeds="0:2", settings=SHORT
 )
@@ -107,7 +101,7 @@ def batch_point(root: Path, n: int, stays_full: bool, table) -> tuple[list[str],
     def work() -> tuple[int, bool]:
         arm(root, n, stays_full)
         try:
-            compare(Batch(suite=SUITE, folder=Path(), out=out), runner=here([]))
+            compare(Batch(suite=SUITE, folder=Path(), out=out), runner=Here())
             status = 0
         except (SurgsimError, job.DiskError):
             status = 2
@@ -116,28 +110,18 @@ def batch_point(root: Path, n: int, stays_full: bool, table) -> tuple[list[str],
     status, reached = in_child(work)
     wrong = [] if status in (0, 2) else [f"exit status {status}"]
     wrong += [f"left: {name}" for name in hidden(root)]
-    whole = {str(path.parent) for path in out.glob("runs/*/*/*/metrics.json")}
+    whole = {str(path.parent) for path in out.glob("runs/*/*/[!.]*/metrics.json")}
     for folder in whole:
         check_contents(Path(folder))
-    again: list[str] = []
-    resumed = compare(Batch(suite=SUITE, folder=Path(), out=out, resume=True), runner=here(again))
+    runner = Here()
+    resumed = compare(Batch(suite=SUITE, folder=Path(), out=out, resume=True), runner=runner)
+    again = runner.folders
     kept = ("run_id", "outcome", "tip_error_rms_mm", "rcm_error_rms_mm")
     if resumed is None or any(resumed[name] != table[name] for name in kept):
         wrong.append("--resume gives another table")
     if whole & {*again} or len(whole) + len(again) != table.num_rows:
         wrong.append(f"--resume did {len(again)} runs, {len(whole)} were whole")
     return wrong, reached
-
-
-def here(folders: list[str]):
-    """A runner that does the jobs in this process and notes their folders."""
-
-    def run(jobs, count):
-        for index, each in enumerate(jobs):
-            folders.append(each.folder)
-            yield Done(index=index, outcome=job.do(each))
-
-    return run
 
 
 def search(root: Path, kind: str) -> None:
@@ -148,7 +132,7 @@ def search(root: Path, kind: str) -> None:
     for scenario in checked:
         made[scenario.sha256()] = execute(scenario)
     job.execute = lambda scenario: made[scenario.sha256()]  # type: ignore[assignment]
-    table = compare(Batch(suite=SUITE, folder=Path(), out=root / "reference"), runner=here([]))
+    table = compare(Batch(suite=SUITE, folder=Path(), out=root / "reference"), runner=Here())
     points, wrong = 0, {}
     for stays_full in (False, True):
         for n in range(1, MOST):

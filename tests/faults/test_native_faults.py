@@ -41,8 +41,13 @@ def shim(tmp_path_factory) -> Path:
 @pytest.mark.parametrize(("kind", "least"), [("new", 55), ("replaced", 60), ("batch", 120)])
 def test_nothing_hangs_is_damaged_or_left(shim, tmp_path, kind, least):
     command = [sys.executable, HERE / "native.py", tmp_path, kind]
+    paths = [str(HERE.parent / "plugins"), *filter(None, [os.environ.get("PYTHONPATH")])]
     done = subprocess.run(
-        command, env={**os.environ, "LD_PRELOAD": str(shim)}, capture_output=True, text=True, timeout=3600
+        command,
+        env={**os.environ, "LD_PRELOAD": str(shim), "PYTHONPATH": os.pathsep.join(paths)},
+        capture_output=True,
+        text=True,
+        timeout=3600,
     )
     assert done.returncode == 0, done.stderr
     result = json.loads(done.stdout.rpartition("RESULT ")[2])

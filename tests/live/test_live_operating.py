@@ -3,9 +3,11 @@
 import json
 import os
 import signal
+import time
 
 import numpy as np
 import pytest
+from numba.core import event
 
 from surgsim.cli.main import main
 from surgsim.live import operate
@@ -14,6 +16,7 @@ from surgsim.live.picture import Picture, screen_axes
 from surgsim.live.window import check_display
 from surgsim.recording.read import read_recording
 from surgsim.scenario.load import load_scenario
+from surgsim.simulate.loop import Simulation
 from surgsim.simulate.setup import prepare
 
 SHORT = ("--set", "theatre=false", "--set", "task.hold_end_s=0.1", "--set", "task.channel.delay_s=0.05")
@@ -170,6 +173,23 @@ def test_a_person_s_input_is_never_overwritten(person, capsys):
     assert main(["run", "teleop_free_motion_panda", "--out", "live"]) == 2
     said = "surgsim: live holds 'operator_input.csv', which is not a run's; choose another --out\n"
     assert capsys.readouterr().err == 2 * said
+
+
+def test_compiling_is_not_counted_as_simulating(person, tmp_path, monkeypatch):
+    """Half a second in which numba compiles, told by its own events, while the tape is played."""
+    assert person("--no-record", "--out", "live", closes_at=1) == 0
+    real = Simulation.run
+
+    def run(simulation, progress=None):
+        with event.trigger_event("numba:compiler_lock"):
+            time.sleep(0.5)
+        return real(simulation, progress)
+
+    monkeypatch.setattr(Simulation, "run", run)
+    scenario = load_scenario("live/scenario.yaml")
+    began = time.perf_counter()
+    result = operate.operate(scenario, "live/operator_input.csv", tmp_path / "again", record=False)
+    assert result.wall_time_s < time.perf_counter() - began - 0.5
 
 
 def test_errors_are_one_line(person, monkeypatch, capsys):

@@ -11,21 +11,18 @@ from typing import Any
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
+from batches import Here, short_run
 
 from surgsim.cli.main import main
 from surgsim.compare.table import read_table
 from surgsim.errors import SurgsimError
 from surgsim.recording.sealed import read_sealed, sealed
 
-SUITE = """name: made
+SUITE = f"""name: made
 scenarios: [circle_lwr4plus]
 controllers: [pinv, vprnn]
 seeds: "0:2"
-settings:
-  - task.duration_s=0.3
-  - task.ramp_s=0.1
-  - task.hold_start_s=0
-  - task.hold_end_s=0
+settings: {json.dumps(short_run(0.3))}
 """
 RUN = Path("runs/circle_lwr4plus/vprnn/base-seed1")
 NONE = "holds no runs.parquet"
@@ -236,24 +233,17 @@ def test_a_damaged_run_is_not_counted_but_done_again(name: str, batch, whole, mo
     METRICS_JSON[name](batch / RUN / "metrics.json")
     others = {
         path: path.stat().st_mtime_ns
-        for path in batch.glob("runs/*/*/*/metrics.json")
+        for path in batch.glob("runs/*/*/[!.]*/metrics.json")
         if RUN.name not in str(path)
     }
-    monkeypatch.setattr("surgsim.compare.workers.run_jobs", _here)
+    runner = Here()
+    monkeypatch.setattr("surgsim.compare.choice.run_jobs", runner)
     assert main(list(RESUME)) == 0
+    assert runner.folders == [str(Path("out") / RUN)]
     assert {path: path.stat().st_mtime_ns for path in others} == others
     again, first = (read_table(folder).to_pylist() for folder in (batch, whole / "out"))
     keys = ("run_id", "outcome", "tip_error_rms_mm", "rcm_error_max_mm")
     assert [[row[key] for key in keys] for row in again] == [[row[key] for key in keys] for row in first]
-
-
-def _here(jobs, count):
-    """Runs the jobs in this process."""
-    from surgsim.compare.job import do
-    from surgsim.compare.workers import Done
-
-    assert len(jobs) == 1
-    yield Done(index=0, outcome=do(jobs[0]))
 
 
 def test_there_are_enough() -> None:

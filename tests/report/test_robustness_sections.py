@@ -82,7 +82,7 @@ def test_panels_show_every_disturbance_with_its_failures(swept):
     section = _section(swept, "robustness")
     said = [unescape(label) for label in re.findall(r'role="img" aria-label="([^"]*)"', section)]
     assert said == [
-        f"{metric} against {label}, 2 controllers, {count} fail."
+        f"{metric}, log scale against {label}, 2 controllers, {count} fail."
         for metric in ("RCM error, RMS [mm]", "tip error, RMS [mm]")
         for label, count in (("payload <b>[kg]</b>", 1), ("delay", 0))
     ]

@@ -7,6 +7,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from surgsim.compare.intervals import Interval
+from surgsim.report.figures.boxes import Group, box_plot
+from surgsim.report.figures.curves import Curve, curve_plot
+from surgsim.report.figures.frontier import Track, frontier_plot
+from surgsim.report.figures.intervals import interval_plot
 from surgsim.report.figures.scale import Scale
 from surgsim.report.figures.svg import CHARACTER, margin
 
@@ -77,3 +82,21 @@ def test_the_labels_of_a_vertical_axis_have_room():
     for low in (1.001e-9, 1.0, 12345.0):
         scale = Scale.over([low, 1.01 * low], 186, 22)
         assert margin(scale) - 5 >= CHARACTER * max(len(text) for _, text in scale.labels())
+
+
+@pytest.mark.parametrize(("largest", "log"), [(2.0, False), (2000.0, True)])
+def test_a_screen_reader_is_told_of_a_logarithmic_axis_as_the_eye_is(largest, log):
+    x = np.array([1.0, 2.0])
+    values = np.array([1.0, largest])
+    name = "error [mm], log scale" if log else "error [mm]"
+    group = Group(name="a", index=0, values=values, runs=2, failed=0)
+    track = Track(index=0, x=x, middle=values, low=values, high=values, failed=x.astype(int) * 0, runs=x)
+    drawn = {
+        f"Box plot of {name}. ": box_plot([group], "error [mm]"),
+        f"{name}. a: ": interval_plot([("a", 0, Interval(value=1.0, low=1.0, high=largest))], "error [mm]"),
+        f"{name} over time [s], ": curve_plot([Curve(index=0, x=x, middle=values)], "time [s]", "error [mm]"),
+        f"{name} against mass, ": frontier_plot([track], "mass", "error [mm]"),
+    }
+    for said, drawing in drawn.items():
+        assert f'aria-label="{said}' in drawing
+        assert f">{name}</text>" in drawing

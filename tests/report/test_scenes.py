@@ -81,16 +81,17 @@ def ask(monkeypatch, answers):
         answer = next(given)
         if isinstance(answer, Exception):
             raise answer
-        return subprocess.CompletedProcess(command, 0, stdout=answer, stderr="")
+        status, said = answer if isinstance(answer, tuple) else (0, answer)
+        return subprocess.CompletedProcess(command, status, stdout=said.encode(), stderr=b"")
 
-    monkeypatch.setattr(scenes.subprocess, "run", run)
+    monkeypatch.setattr("surgsim.resources.subprocess.run", run)
     monkeypatch.delenv("MUJOCO_GL", raising=False)
     scenes.drawn.cache_clear()
     return asked
 
 
 def test_drawing_is_tried_without_a_display_then_with_one_then_not_at_all(monkeypatch):
-    lost = subprocess.CalledProcessError(-11, "python")
+    lost = (-11, "")
     late = subprocess.TimeoutExpired("python", 120.0)
     asked = ask(monkeypatch, [lost, late, json.dumps([{**SCENE, "picture": None}])])
     (found,) = scenes.drawn(("circle_lwr4plus",))
@@ -104,6 +105,24 @@ def test_the_first_picture_is_taken_and_an_answer_that_is_none_is_done_without(m
     assert asked == [(True, "egl")]
     ask(monkeypatch, ["{", "3", ""])
     assert scenes.drawn(("circle_lwr4plus",)) == ()
+
+
+def test_where_nothing_is_drawn_but_the_scene_is_told_nobody_is_asked_again(monkeypatch):
+    bare = json.dumps([{**SCENE, "picture": None}])
+    asked = ask(monkeypatch, [bare, bare])
+    (found,) = scenes.drawn(("circle_lwr4plus",))
+    assert (found.picture, asked) == (None, [(True, "egl"), (True, None)])
+    asked = ask(monkeypatch, [bare, (-11, "")])
+    assert scenes.drawn(("circle_lwr4plus",)) == (found,)
+    assert asked == [(True, "egl"), (True, None)]
+
+
+def test_a_scene_needs_neither_plant_nor_controller(monkeypatch):
+    for part in ("build", "Controller"):
+        monkeypatch.setattr(f"surgsim.simulate.setup.{part}", lambda *_, **__: pytest.fail("not needed"))
+    (found,) = main({"scenarios": ["circle_lwr4plus"], "draw": False})
+    setup_free = load_scenario("circle_lwr4plus")
+    assert found["trocar"] == list(setup_free.trocar.position_m)
 
 
 def test_a_run_s_own_scenario_is_preferred_to_the_shipped_one(made_results, monkeypatch):

@@ -1,11 +1,13 @@
 """Drafts: what a dead process left is removed, what a living one writes is not."""
 
+import os
 import subprocess
 import sys
 
 import pytest
 
 from surgsim.runs.drafts import clear_drafts, draft_of
+from surgsim.runs.exchange import restore
 
 HOLD = """
 import sys
@@ -55,6 +57,25 @@ def test_drafts_of_other_folders_stay_unless_all_are_meant(tmp_path):
     assert other.is_dir()
     clear_drafts(tmp_path)
     assert sorted(path.name for path in tmp_path.iterdir()) == [".run.abc", "run.part"]
+
+
+def test_a_folder_is_not_taken_for_another_one_whose_name_goes_on_after_a_dot(tmp_path):
+    """A draft, and what was set aside, of `v1.1` are not of `v1`."""
+    (tmp_path / ".v1.1.abc.part").mkdir()
+    (tmp_path / ".v1.1.abc.old").mkdir()
+    clear_drafts(tmp_path, "v1")
+    restore(tmp_path / "v1")
+    assert sorted(os.listdir(tmp_path)) == [".v1.1.abc.old", ".v1.1.abc.part"]
+    clear_drafts(tmp_path, "v1.1")
+    restore(tmp_path / "v1.1")
+    assert os.listdir(tmp_path) == ["v1.1"]
+
+
+@pytest.mark.parametrize("name", ["run", "v1.1", "a[1]*?", "a b"])
+def test_whatever_its_folder_is_called_a_draft_is_found(tmp_path, name):
+    (tmp_path / f".{name}.abc.part").mkdir()
+    clear_drafts(tmp_path, name)
+    assert os.listdir(tmp_path) == []
 
 
 def test_a_draft_can_be_renamed_into_place(tmp_path):

@@ -39,7 +39,7 @@ def box_plot(groups: Sequence[Group], label: str) -> str:
     drawing = Drawing(bottom + 34)
     everything = np.concatenate([group.values for group in groups])
     scale = Scale.over(everything.tolist(), _LEFT, WIDTH - 10)
-    drawing.x_axis(scale, _TOP, bottom, label + (", log scale" if scale.log else ""))
+    drawing.x_axis(scale, _TOP, bottom, scale.named(label))
     said = []
     for row, group in enumerate(groups):
         top = _TOP + _ROW * row
@@ -48,7 +48,7 @@ def box_plot(groups: Sequence[Group], label: str) -> str:
         if group.values.size:
             _box(drawing, scale, group, top + 29)
             said.append(f"{group.name}: median {number(float(np.median(group.values)))}")
-    return drawing.render(f"Box plot of {label}. {'; '.join(said)}.")
+    return drawing.render(f"Box plot of {scale.named(label)}. {'; '.join(said)}.")
 
 
 def _count(group: Group) -> str:

@@ -47,8 +47,8 @@ def curve_plot(
     x = Scale.over(np.concatenate([c.x for c in curves]).tolist(), left, WIDTH - 10, log=log_x)
     if not log_x:
         x = Scale(low=float(min(c.x[0] for c in curves)), high=x.high, start=x.start, end=x.end)
-    drawing.x_axis(x, _TOP, _BOTTOM, x_label + (", log scale" if x.log else ""))
-    drawing.y_axis(y, left, WIDTH - 10, y_label + (", log scale" if y.log else ""))
+    drawing.x_axis(x, _TOP, _BOTTOM, x.named(x_label))
+    drawing.y_axis(y, left, WIDTH - 10, y.named(y_label))
     for curve in curves:
         if curve.low is not None and curve.high is not None:
             there = _points(x, y, curve, curve.low)
@@ -61,7 +61,7 @@ def curve_plot(
         points = _points(x, y, curve, curve.middle)
         if points:
             drawing.path(polyline(points), f"line {colour(curve.index)}", dash(curve.index))
-    return drawing.render(f"{y_label} over {x_label}, {len(curves)} controllers.")
+    return drawing.render(f"{y.named(y_label)} over {x.named(x_label)}, {len(curves)} controllers.")
 
 
 def _heights(curves: Sequence[Curve]) -> list[float]:

@@ -46,15 +46,15 @@ def frontier_plot(tracks: Sequence[Track], x_label: str, y_label: str) -> str:
     y = Scale.over(values.tolist(), bottom, top)
     left = margin(y)
     x = Scale.over(np.concatenate([t.x for t in tracks]).tolist(), left + 16, WIDTH - 34)
-    drawing.x_axis(x, _STRIP, bottom, x_label + (", log scale" if x.log else ""))
-    drawing.y_axis(y, left, WIDTH - 10, y_label + (", log scale" if y.log else ""))
+    drawing.x_axis(x, _STRIP, bottom, x.named(x_label))
+    drawing.y_axis(y, left, WIDTH - 10, y.named(y_label))
     for row, track in enumerate(failing):
         _crosses(drawing, x, track, _STRIP + _ROW * row)
     if failing:
         drawing.text(left - 5, _STRIP + 4 + _ROW * (len(failing) - 1) / 2, "failed", "tick", "end")
     for k, track in enumerate(tracks):
         _track(drawing, x, y, track, 3.0 * (k - (len(tracks) - 1) / 2))
-    return drawing.render(f"{y_label} against {x_label}, {len(tracks)} controllers.")
+    return drawing.render(f"{y.named(y_label)} against {x.named(x_label)}, {len(tracks)} controllers.")
 
 
 def _crosses(drawing: Drawing, x: Scale, track: Track, y: float) -> None:

@@ -16,7 +16,7 @@ def interval_plot(rows: Sequence[tuple[str, int, Interval]], label: str) -> str:
     drawing = Drawing(bottom + 34)
     ends = [x for _, _, i in rows for x in (i.value, i.low, i.high) if x is not None]
     scale = Scale.over(ends, 12, WIDTH - 12)
-    drawing.x_axis(scale, _TOP, bottom, label + (", log scale" if scale.log else ""))
+    drawing.x_axis(scale, _TOP, bottom, scale.named(label))
     said = []
     for k, (name, index, interval) in enumerate(rows):
         y = _TOP + _ROW * k
@@ -26,7 +26,7 @@ def interval_plot(rows: Sequence[tuple[str, int, Interval]], label: str) -> str:
         said.append(f"{name}: {text}")
         if interval.value is not None:
             _whisker(drawing, scale, interval, index, y + 24)
-    return drawing.render(f"{label}. {'; '.join(said)}.")
+    return drawing.render(f"{scale.named(label)}. {'; '.join(said)}.")
 
 
 def _whisker(drawing: Drawing, scale: Scale, interval: Interval, index: int, y: float) -> None:

@@ -44,14 +44,15 @@ def levels_plot(tracks: Sequence[LevelTrack], levels: Sequence[str], x_label: st
     y = Scale.over(values.tolist(), bottom, top, log=True if positive else None)
     left = margin(y)
     columns = [left + (WIDTH - 10 - left) * (k + 0.5) / len(levels) for k in range(len(levels))]
-    _axes(drawing, y, columns, levels, (x_label, y_label + (", log scale" if y.log else "")))
+    _axes(drawing, y, columns, levels, (x_label, y.named(y_label)))
     for row, track in enumerate(failing):
         y_row = _STRIP + _ROW * (row + 0.5)
         drawing.path(mark(track.index, left - 8, y_row, 3.5), f"fill {colour(track.index)}")
         _crosses(drawing, columns, track, y_row)
     for k, track in enumerate(tracks):
         _track(drawing, [x + _SHIFT * (k - (len(tracks) - 1) / 2) for x in columns], y, track)
-    return drawing.render(f"{y_label} against {x_label}, {len(tracks)} controllers, {len(failing)} fail.")
+    said = f"{y.named(y_label)} against {x_label}, {len(tracks)} controllers, {len(failing)} fail."
+    return drawing.render(said)
 
 
 def _axes(

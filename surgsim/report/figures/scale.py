@@ -54,6 +54,10 @@ class Scale:
         bottom = max(low - room, 0.0) if low >= 0.0 else low - room
         return Scale(low=bottom, high=high + room, start=start, end=end)
 
+    def named(self, label: str) -> str:
+        """What the axis is called: its `label`, and that it is logarithmic if it is."""
+        return f"{label}, log scale" if self.log else label
+
     def at(self, value: float) -> float:
         """Place of `value`, kept on the axis."""
         if not self.log:

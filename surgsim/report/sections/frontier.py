@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 
 from surgsim.compare.observations import Observations
+from surgsim.metrics.catalog import METRICS
 from surgsim.report import html
 from surgsim.report.axes import axes_of, sweeps_of
 from surgsim.report.figures.frontier import Track, frontier_plot
 from surgsim.report.results import Results, parameters_of
-from surgsim.report.sections.leaderboard import metric_label
 
 
 def frontiers(runs: Observations, results: Results, controllers: Sequence[str]) -> str:
@@ -52,8 +52,10 @@ def _frontiers(runs: Observations, results: Results, controllers: Sequence[str],
             if (track := _track(runs.of_controller(name), index, metric, key)) is not None
         ]
         if any(np.isfinite(track.middle).any() for track in tracks):
-            drawing = frontier_plot(tracks, key, metric_label(metric))
-            figures.append(html.figure(drawing, metric_label(metric), "median and 10–90 % of completed runs"))
+            drawing = frontier_plot(tracks, key, METRICS[metric].heading)
+            figures.append(
+                html.figure(drawing, METRICS[metric].heading, "median and 10–90 % of completed runs")
+            )
     held = f", with {fixed}" if fixed else ""
     text = f"Against {key}{held}. Crosses: failed runs of all at that point."
     return html.paragraph(text) + html.figures(*figures)

@@ -6,12 +6,12 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from surgsim.compare.observations import Observations
+from surgsim.metrics.catalog import METRICS
 from surgsim.report import html
 from surgsim.report.axes import Axis, axes_of
 from surgsim.report.figures.heat import HeatMap, heat_map, shades_of
 from surgsim.report.figures.ticks import tick_text
 from surgsim.report.results import Results, parameters_of
-from surgsim.report.sections.leaderboard import metric_label
 
 _METRICS = ("rcm_error_rms_mm", "tip_error_rms_mm")
 
@@ -30,7 +30,7 @@ def maps_section(results: Results) -> str:
     parts = []
     for name, metric in itertools.product(results.runs.scenarios, _METRICS):
         if metric in results.metrics:
-            title = f"{metric_label(metric)}, {name}" if several else metric_label(metric)
+            title = f"{METRICS[metric].heading}, {name}" if several else METRICS[metric].heading
             drawn = _maps(results.runs.of_scenario(name), results.runs.controllers, (x, y), others, metric)
             parts.append(f"<h3>{html.escape(title)}</h3>{drawn}")
     return html.section("frontier", "Frontier", html.paragraph(note), *parts)
@@ -57,8 +57,8 @@ def _maps(
         rows.append(f"<h4>{html.escape(where)}</h4>" if where else "")
         drawn = [
             html.figure(
-                heat_map(found[key], shades, plane[0].label, plane[1].label, metric_label(metric)),
-                f"{key[1]}, {metric_label(metric)}",
+                heat_map(found[key], shades, plane[0].label, plane[1].label, METRICS[metric].heading),
+                f"{key[1]}, {METRICS[metric].heading}",
             )
             for key in group
         ]

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 from surgsim.compare.failures import Failing
 from surgsim.compare.summary import Summary, summary
-from surgsim.compare.wording import plural
+from surgsim.display import count
 from surgsim.report import html
 from surgsim.report.figures.schematic import schematic
 from surgsim.report.results import Results
@@ -24,7 +24,7 @@ def header(results: Results, boards: Boards, scenes: Sequence[SceneView]) -> str
 
 def _told(results: Results, boards: Boards) -> str:
     if not boards:
-        return html.paragraph(f"No run completed: {plural(len(results.runs), 'run')} failed.", "lead")
+        return html.paragraph(f"No run completed: {count(len(results.runs), 'run')} failed.", "lead")
     metric = results.headline[0]
     found: Summary = summary(results.runs, metric, list(boards[metric].values()))
     fails = "".join(_fails(results, one) for one in found.failing)
@@ -46,11 +46,11 @@ def _counts(results: Results) -> str:
     failed, idle = len(runs) - int(runs.completed.sum()), int(runs.not_done.sum())
     points = len(set(runs.parameters.tolist()))
     parts = [
-        plural(len(runs), "run"),
-        plural(len(runs.controllers), "controller"),
-        plural(len(runs.scenarios), "scenario"),
-        *([plural(points, "grid point")] if points > 1 else []),
-        plural(len(set(runs.seed.tolist())), "seed"),
+        count(len(runs), "run"),
+        count(len(runs.controllers), "controller"),
+        count(len(runs.scenarios), "scenario"),
+        *([count(points, "grid point")] if points > 1 else []),
+        count(len(set(runs.seed.tolist())), "seed"),
         f"{len(runs) - failed} completed",
     ]
     items = [f"<li>{part}</li>" for part in parts]

@@ -154,11 +154,6 @@ def _best(results: Results, metric: str, rows: Mapping[str, LeaderboardRow]) -> 
     return found if len(found) < len(rows) else set()
 
 
-def metric_label(name: str) -> str:
-    """Heading of a metric: words and unit."""
-    return METRICS[name].heading
-
-
 def failures_section(results: Results) -> str:
     """Outcomes of every controller; empty if every run completed and did its task."""
     runs = results.runs

@@ -6,13 +6,13 @@ import numpy as np
 
 from surgsim.compare.failures import WORST_RCM_MM
 from surgsim.compare.observations import Observations
+from surgsim.metrics.catalog import METRICS
 from surgsim.report import html
 from surgsim.report.axes import Axis, sweeps_of
 from surgsim.report.failing import AtLevel, along, at_level
 from surgsim.report.figures.levels import LevelTrack, levels_plot
 from surgsim.report.figures.ticks import tick_text
 from surgsim.report.results import Results
-from surgsim.report.sections.leaderboard import metric_label
 
 _METRICS = ("rcm_error_rms_mm", "tip_error_rms_mm", "trocar_force_rms_n")
 _UNDISTURBED, _OFF = "undisturbed", "off"
@@ -42,7 +42,7 @@ def _scenario(runs: Observations, results: Results, sweeps: Sequence[Axis]) -> s
     parts = [_table(runs, results.runs.controllers, sweeps)]
     for metric in (name for name in _METRICS if name in results.metrics):
         panels = [_panel(runs, results.runs.controllers, sweep, sweeps, metric) for sweep in sweeps]
-        parts.append(html.details(f"{metric_label(metric)} over the levels", html.figures(*panels)))
+        parts.append(html.details(f"{METRICS[metric].heading} over the levels", html.figures(*panels)))
     return "".join(parts)
 
 
@@ -58,7 +58,7 @@ def _panel(
     if not any(np.isfinite(track.middle[1:]).any() for track in tracks):
         return ""
     names = [_OFF, *map(tick_text, sweep.levels)]
-    drawing = levels_plot(tracks, names, sweep.label, metric_label(metric))
+    drawing = levels_plot(tracks, names, sweep.label, METRICS[metric].heading)
     return html.figure(drawing, sweep.name.replace("_", " "))
 
 

@@ -5,14 +5,14 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from surgsim.compare.observations import Observations
-from surgsim.compare.wording import number, plural
+from surgsim.compare.wording import number
+from surgsim.display import count
 from surgsim.metrics.catalog import METRICS
 from surgsim.report import html
 from surgsim.report.figures.boxes import MOST_POINTS, Group, box_plot
 from surgsim.report.figures.curves import Curve, curve_plot
 from surgsim.report.results import Results, parameters_of
 from surgsim.report.sections.frontier import frontiers
-from surgsim.report.sections.leaderboard import metric_label
 from surgsim.report.sections.pairs import comparison_table
 from surgsim.report.series import COLUMNS, Series
 
@@ -90,8 +90,8 @@ def _facts(runs: Observations) -> str:
     points = len(set(runs.parameters.tolist()))
     grid = f" × {points} grid points" if points > 1 else ""
     return (
-        f"{plural(len(runs), 'run')}: {plural(len(runs.controllers), 'controller')} × "
-        f"{plural(seeds, 'seed')}{grid}; {done} completed, {len(runs) - done} failed"
+        f"{count(len(runs), 'run')}: {count(len(runs.controllers), 'controller')} × "
+        f"{count(seeds, 'seed')}{grid}; {done} completed, {len(runs) - done} failed"
     )
 
 
@@ -108,7 +108,7 @@ def _boxes(runs: Observations, controllers: Sequence[str], metric: str) -> str:
         return ""
     many = any(group.values.size > MOST_POINTS for group in groups)
     note = METRICS[metric].meaning + (f"; {MOST_POINTS} points of each drawn" if many else "")
-    return html.figure(box_plot(groups, metric_label(metric)), metric_label(metric), note)
+    return html.figure(box_plot(groups, METRICS[metric].heading), METRICS[metric].heading, note)
 
 
 def _over_time(series: Series | None, controllers: Sequence[str], columns: Sequence[str]) -> str:
@@ -167,7 +167,7 @@ def _compared(results: Results, name: str) -> str:
     if len(results.runs.controllers) < 2:
         return ""
     tables = [
-        f"<h4>{html.escape(metric_label(metric))}</h4>{comparison_table(results, metric, name)}"
+        f"<h4>{html.escape(METRICS[metric].heading)}</h4>{comparison_table(results, metric, name)}"
         for metric in results.headline
     ]
     return html.details("Controllers in pairs, in this scenario", *tables)
