@@ -5,7 +5,7 @@ from time import perf_counter
 import numpy as np
 import pytest
 
-from surgsim.compiled import watch
+from surgsim.compiled import address_of, watch
 
 SHAPES = "from typing import NamedTuple\nclass Seen(NamedTuple):\n    q: object\n    J: object\n"
 TYPED = """
@@ -47,6 +47,44 @@ def test_kernels_of_a_signature_compile_at_import_and_pass_as_parameters(worksho
         assert module.loop(module.halve, seen, out) == 1
         assert out.tolist() == [2.0, 3.0]
         assert workshop.compiled == expected
+
+
+BY_ADDRESS = """
+from numba import types
+from surgsim.compiled import call_at, compiled
+
+A = types.float64[::1]
+STEP = types.int64(A, A)
+
+@compiled
+def double(x, out):
+    out[:] = 2.0 * x
+    return 0
+
+@compiled
+def refuse(x, out):
+    if x[0] < 0.0:
+        raise ValueError("negative")
+    return 7
+
+@compiled
+def loop(address, x, out):
+    return call_at(address, x, out)
+"""
+
+
+def test_a_kernel_is_called_by_its_address(workshop):
+    workshop.write(user=BY_ADDRESS)
+    for _ in range(2):
+        module = workshop.run("user")
+        x, out = np.array([1.0, 2.0]), np.zeros(2)
+        assert module.loop(address_of(module.double, module.STEP), x, out) == 0
+        assert out.tolist() == [2.0, 4.0]
+        refuse = address_of(module.refuse, module.STEP)
+        assert module.loop(refuse, x, out) == 7
+        with pytest.raises(ValueError, match="^negative$"):
+            module.loop(refuse, -x, out)
+    assert workshop.compiled == []
 
 
 def test_several_signatures_as_text_and_no_other_types(workshop):

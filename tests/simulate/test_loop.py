@@ -36,6 +36,14 @@ def test_control_time_is_the_controllers_and_not_what_else_the_machine_does(scen
     assert worked >= 0.05
 
 
+def test_the_time_of_kernels_alone_is_taken_in_every_eighth_tick(trace, scenario, asking):
+    timed = np.isfinite(trace["control_time_s"])
+    assert timed[::8].all()
+    assert timed.sum() == len(timed[::8])
+    setup = asking(prepare(scenario("task.duration_s=1")), lambda tick, problem: None)
+    assert np.isfinite(Simulation(setup).run()["control_time_s"]).all()
+
+
 def _nothing(length_s):
     pass
 

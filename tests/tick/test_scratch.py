@@ -1,0 +1,59 @@
+"""Arrays on the stack: large enough for every arm, and never handed back by the function that they are in."""
+
+import ast
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import surgsim
+from surgsim.compiled import compiled
+from surgsim.tick.arrays import MOST_JOINTS
+from surgsim.tick.scratch import scratch, scratch_matrix
+
+NAMES = {"scratch", "scratch_matrix"}
+FUNCTIONS = [
+    (path.name, node)
+    for path in sorted(Path(surgsim.__file__).parent.rglob("*.py"))
+    if path.name != "scratch.py"
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+    if isinstance(node, ast.FunctionDef)
+    if any(isinstance(n, ast.Call) and getattr(n.func, "id", "") in NAMES for n in ast.walk(node))
+]
+
+
+@compiled
+def _sums(x, out):
+    square, line = scratch_matrix(3, x.size), scratch(x.size)
+    for j in range(x.size):
+        line[j] = 0.0
+        for i in range(3):
+            square[i, j] = (i + 1) * x[j]
+    for i in range(3):
+        for j in range(x.size):
+            line[j] += square[i, j]
+    out[:] = line
+
+
+def test_scratch_holds_what_is_written_in_compiled_code_and_in_python():
+    x, out = np.arange(MOST_JOINTS, dtype=float), np.zeros(MOST_JOINTS)
+    for form in (_sums, _sums.py_func):
+        out[:] = 0.0
+        form(x, out)
+        np.testing.assert_array_equal(out, 6.0 * x)
+
+
+@pytest.mark.parametrize(("file", "function"), FUNCTIONS, ids=lambda value: getattr(value, "name", value))
+def test_no_function_returns_its_scratch(file, function):
+    assert ast.unparse(function.returns) in {"int", "float", "bool", "None", "tuple[float, float]"}
+
+
+def test_functions_with_scratch_are_found():
+    assert {"hierarchical_impedance", "nearest", "vprnn"} <= {function.name for _, function in FUNCTIONS}
+
+
+def test_more_than_there_is_room_for_is_seen_in_the_python_form():
+    with pytest.raises(AssertionError):
+        scratch(1000)
+    with pytest.raises(AssertionError):
+        scratch_matrix(10, 10)
