@@ -121,6 +121,24 @@ class Simulation:
         )
 
     @property
+    def arguments(self) -> tuple[Any, ...]:
+        """What the loop works on: the arguments of `run_ticks` after the number of ticks."""
+        plant, controller = self._setup.plant, self._setup.controller
+        return (
+            self._run,
+            self._tables,
+            controller.control,
+            plant.world,
+            plant.bore,
+            self._safety.guard,
+            self._stop,
+            self._task.kernel,
+            *controller.kernels,
+            plant.advance,
+            plant.hooks.functions,
+        )
+
+    @property
     def time_s(self) -> float:
         """Simulated time reached [s]."""
         return float(self._setup.plant.world.t_s)
@@ -177,22 +195,8 @@ class Simulation:
             left -= block
 
     def _advance_by(self, ticks: int) -> None:
-        plant, controller = self._setup.plant, self._setup.controller
-        plant.refill()
-        self._run_ticks(
-            ticks,
-            self._run,
-            self._tables,
-            controller.control,
-            plant.world,
-            plant.bore,
-            self._safety.guard,
-            self._stop,
-            self._task.kernel,
-            *controller.kernels,
-            plant.advance,
-            plant.hooks.functions,
-        )
+        self._setup.plant.refill()
+        self._run_ticks(ticks, *self.arguments)
         if self._run.progress.reason != GOING:
             self._ending = self._end(int(self._run.progress.reason))
 
