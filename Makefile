@@ -4,7 +4,7 @@ ROOT := $(patsubst %/,%,$(dir $(abspath $(lastword $(MAKEFILE_LIST)))))
 VENV := $(ROOT)/.venv
 PY := $(VENV)/bin/python
 PYTHON ?= $(shell command -v python3.11 || command -v python3)
-EXTRAS := dev,gymnasium,pandas,ray
+EXTRAS := dev,gymnasium,pandas,ray,bench
 RUN := runs/circle_lwr4plus/vprnn-seed0
 
 # What is installed follows from these; a stamp named after them says that pip has nothing to do.

@@ -8,7 +8,7 @@ from typing import Any, TypeVar, cast, overload
 import numba
 from numba import types
 from numba.core import cgutils
-from numba.core.errors import NumbaExperimentalFeatureWarning
+from numba.core.errors import NumbaExperimentalFeatureWarning, TypingError
 from numba.core.typeinfer import register_dispatcher
 from numba.extending import intrinsic, is_jitted
 from numba.extending import overload as overload_function
@@ -75,6 +75,9 @@ _IN_PYTHON: dict[int, Callable[..., int]] = {}
 def _call_address(context: Any, address: Any, values: Any) -> Any:
     """Call what is at an address with the entries of a tuple; it returns a whole number."""
     kinds = tuple(values)
+    for kind in kinds:  # what is called cannot say what it was compiled for
+        if isinstance(kind, types.Array) and kind != types.Array(kind.dtype, kind.ndim, "C"):
+            raise TypingError(f"call_at takes arrays that are whole and may be written, not {kind}")
 
     def generate(target: Any, builder: Any, signature: Any, given: Any) -> Any:
         result = signature.return_type

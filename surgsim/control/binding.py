@@ -9,7 +9,7 @@ from numba.core.dispatcher import Dispatcher
 from numpy.typing import NDArray
 
 from surgsim.columns import Block
-from surgsim.compiled import as_parameter
+from surgsim.compiled import address_of
 from surgsim.control.decision import ESTIMATOR, LAW, SOLVER
 from surgsim.control.failure import ControlFailure, failure_of
 from surgsim.control.port_estimators.base import PortEstimate, port_problem_of
@@ -105,7 +105,6 @@ class Bound:
     """Parts joined to the records of a tick.
 
     Attributes:
-        kernels: Port estimator, resolver and torque law.
         entered: The parts that are entered in Python, by the value of `Control.who`.
         parts: The parts.
         control: The record of the tick.
@@ -113,7 +112,6 @@ class Bound:
         remembered: What the parts that are Python objects remember, by the value of `Control.who`.
     """
 
-    kernels: tuple[Any, Any, Any]
     entered: dict[int, PythonPart]
     parts: ControllerParts
     control: Any
@@ -163,28 +161,22 @@ def bind(parts: ControllerParts, control: Any, arm: ArmModel) -> Bound:
     for name, array in minds._asdict().items():
         point(control.minds[name], array)
 
-    def kernel(who: int, part: Any, gains: Array, call: Callable[[], int | None]) -> Any:
+    def kernel(who: int, part: Any, gains: Array, call: Callable[[], int | None]) -> int:
         signature = resolver_signature(n) if who == SOLVER else law_signature(n)
         if _is_compiled(part):
-            return as_parameter(part.kernel, signature)
+            return address_of(part.kernel, signature)
         if part is not None:
             entered[who] = PythonPart(call, _status_of)
             gains[:] = entered[who].gains
-        return as_parameter(python_kernel, signature)
+        return address_of(python_kernel, signature)
 
+    port, resolver, law = parts.port, parts.resolver, parts.law
+    solve = _resolver_call(parts, control, minds, arm, remembered)
+    at = control.minds
+    at.port = kernel(ESTIMATOR, port, minds.port_gains, _port_call(port, control, minds, remembered))
+    at.resolver = kernel(SOLVER, resolver, minds.resolver_gains, solve)
+    at.law = kernel(LAW, law, minds.law_gains, _law_call(law, control, minds, remembered))
     return Bound(
-        kernels=(
-            kernel(
-                ESTIMATOR, parts.port, minds.port_gains, _port_call(parts.port, control, minds, remembered)
-            ),
-            kernel(
-                SOLVER,
-                parts.resolver,
-                minds.resolver_gains,
-                _resolver_call(parts, control, minds, arm, remembered),
-            ),
-            kernel(LAW, parts.law, minds.law_gains, _law_call(parts.law, control, minds, remembered)),
-        ),
         entered=entered,
         parts=parts,
         control=control,

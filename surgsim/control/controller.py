@@ -87,7 +87,6 @@ class Controller:
 
     Attributes:
         control: The record that `decide` works on.
-        kernels: Port estimator, resolver and torque law.
         parts: Port estimator, resolver and torque law as their configs build them.
         estimates: Whether the trocar's place is estimated rather than taken as seen.
     """
@@ -118,7 +117,6 @@ class Controller:
             at_reference=config.evaluate_at == "reference",
         )
         self._bound = bind(self.parts, self.control, arm)
-        self.kernels = self._bound.kernels
         self._decide = as_parameter(decide, decide_signature(arm.limits.q_min.size))
         self.reset()
 
@@ -172,7 +170,7 @@ class Controller:
         seen.tau[:], seen.f_T[:] = state.tau, state.f_T
         seen.p_WC[:], seen.v_WC[:], seen.a_WC[:] = state.p_WC, state.v_WC, 0.0
         fill_command(self.control.command, command)
-        status = self._decide(self.control, *self.kernels)
+        status = self._decide(self.control)
         if status != GOES_ON:
             raise self.failure(status)
         return self._output()

@@ -5,15 +5,12 @@ from typing import Any
 
 from numba import types
 
-from surgsim.compiled import compiled
+from surgsim.compiled import call_at, compiled
 from surgsim.control.bounds import fill_velocity_bounds
 from surgsim.control.rcm import fill_rcm
 from surgsim.tick.arrays import (
     Control,
-    Kernel,
     Seen,
-    law_signature,
-    resolver_signature,
     type_of,
 )
 from surgsim.tick.nominal import copy_model, dynamics, kinematics
@@ -25,20 +22,13 @@ ESTIMATOR, SOLVER, LAW = range(3)
 
 
 @cache
-def part_types(n: int) -> tuple[Any, Any, Any]:
-    """Types of port estimator, resolver and torque law as parameters, for n joints."""
-    law, resolver = types.FunctionType(law_signature(n)), types.FunctionType(resolver_signature(n))
-    return law, resolver, law
-
-
-@cache
 def decide_signature(n: int) -> Any:
-    """Status = decide(control, estimator, resolver, law)."""
-    return types.int64(type_of(Control, n), *part_types(n))
+    """Status = decide(control)."""
+    return types.int64(type_of(Control, n))
 
 
 @compiled
-def decide(c: Control, estimator: Kernel, resolver: Kernel, law: Kernel) -> int:
+def decide(c: Control) -> int:
     """Fill the answers in `c` from the measured state and the command in it."""
     seen, minds = c.seen, c.minds
     _refer(c)
@@ -49,19 +39,18 @@ def decide(c: Control, estimator: Kernel, resolver: Kernel, law: Kernel) -> int:
     copy_model(c.measured, seen)
     c.who = ESTIMATOR
     port = doubles(c.port.ctypes.data, 3, 3)
-    status = estimator(numbers(minds.port_gains), seen, numbers(minds.port_memory), port)
+    status: int = call_at(minds.port, numbers(minds.port_gains), seen, numbers(minds.port_memory), port)
     if status != GOES_ON:
         return status
     _see_port(c)
     _see_command(c)
     c.who = SOLVER
+    gains, memory = numbers(minds.resolver_gains), numbers(minds.resolver_memory)
     if c.at_reference:
-        status = resolver(
-            numbers(minds.resolver_gains), _referred(c), numbers(minds.resolver_memory), c.resolved
-        )
+        status = call_at(minds.resolver, gains, _referred(c), memory, c.resolved)
     else:
         _bound(seen)
-        status = resolver(numbers(minds.resolver_gains), seen, numbers(minds.resolver_memory), c.resolved)
+        status = call_at(minds.resolver, gains, seen, memory, c.resolved)
     if status != GOES_ON:
         return status
     c.torque[:] = 0.0
@@ -73,7 +62,7 @@ def decide(c: Control, estimator: Kernel, resolver: Kernel, law: Kernel) -> int:
         seen.a_WTd[:] = c.resolved.a_WTd
         n = c.torque.size
         terms = doubles(minds.terms.address, minds.terms.size // n, n)
-        status = law(numbers(minds.law_gains), seen, numbers(minds.law_memory), terms)
+        status = call_at(minds.law, numbers(minds.law_gains), seen, numbers(minds.law_memory), terms)
         if status != GOES_ON:
             return status
         for i in range(terms.shape[0]):

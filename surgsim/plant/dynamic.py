@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from surgsim.catalog import PartConfig
 from surgsim.columns import Block, scalar
 from surgsim.columns import vector as vector_columns
-from surgsim.compiled import as_parameter, compiled
+from surgsim.compiled import address_of, as_parameter, compiled
 from surgsim.errors import SurgsimError
 from surgsim.models.build import Scene
 from surgsim.plant.bore import Bore, act, drag, wall_force
@@ -215,7 +215,7 @@ class DynamicPlant:
     Attributes:
         world: The arrays of the plant.
         bore: Those of the physical port.
-        advance: The kernel of a control period.
+        advance: Address of the kernel of a control period.
     """
 
     def __init__(
@@ -239,8 +239,9 @@ class DynamicPlant:
         self._port = Port(scene, self._data, self.world)
         self.bore = self._port.bore
         signature = advance_signature(len(scene.dof_ids))
-        self._begin, self.advance = as_parameter(begin, signature), as_parameter(advance_dynamics, signature)
-        self._look = as_parameter(look, signature)
+        self._begin, self._look = as_parameter(begin, signature), as_parameter(look, signature)
+        self._advance = as_parameter(advance_dynamics, signature)
+        self.advance = address_of(advance_dynamics, signature)
         self._ledger = EnergyLedger(scene, self._data, self._port) if energy_ledger else None
         for part in self._parts:
             part.attach(scene, control_period_s)
@@ -383,7 +384,7 @@ class DynamicPlant:
         """
         self.world.torque[:], self.world.qdot[:], self.world.jaw = torque, qdot, jaw
         self.refill()
-        self._told(self.advance(self.world, self.bore, self._table.record))
+        self._told(self._advance(self.world, self.bore, self._table.record))
         return self.state()
 
     def refill(self) -> None:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from surgsim.catalog import PartConfig
 from surgsim.columns import Block
-from surgsim.compiled import as_parameter, compiled
+from surgsim.compiled import address_of, as_parameter, compiled
 from surgsim.models.build import Scene
 from surgsim.plant.bore import Bore
 from surgsim.plant.contacts import ContactWatch
@@ -70,7 +70,7 @@ class KinematicPlant:
     Attributes:
         world: The arrays of the plant.
         bore: There is no physical port.
-        advance: The kernel of a control period.
+        advance: Address of the kernel of a control period.
     """
 
     columns: tuple[Block, ...] = ()
@@ -81,7 +81,8 @@ class KinematicPlant:
         n = len(scene.dof_ids)
         self.world, self.bore = world_of(scene, self._data, control_period_s), new(Bore, n)
         self.hooks = HookTable((), (), n)
-        self.advance = as_parameter(advance_kinematics, advance_signature(n))
+        self._advance = as_parameter(advance_kinematics, advance_signature(n))
+        self.advance = address_of(advance_kinematics, advance_signature(n))
         self._points = PointReader(scene, self._data)
         self.watch = ContactWatch(scene, self._data)
 
@@ -111,7 +112,7 @@ class KinematicPlant:
     def step(self, torque: Array, qdot: Array, jaw: float = 0.0) -> State:
         """Move with velocity `qdot` (n,) [rad/s] for one control period; torque and jaws do nothing."""
         self.world.qdot[:] = qdot
-        self.advance(self.world, self.bore, self.hooks.record)
+        self._advance(self.world, self.bore, self.hooks.record)
         return self.state()
 
     def refill(self) -> None:

@@ -113,9 +113,25 @@ class Simulation:
         for name in run.at.dtype.names:
             run.at[name] = self._rows.begins(name)[0]
         run.rows, run.columns = self._rows.data.ctypes.data, self._rows.data.shape[1]
+        run.task, run.advance = self._task.kernel, setup.plant.advance
         point(run.task_gains, self._task.gains)
         point(run.task_memory, self._task.memory)
         return run
+
+    @property
+    def arguments(self) -> tuple[Any, ...]:
+        """What the loop works on: the arguments of `run_ticks` after the number of ticks."""
+        plant, controller = self._setup.plant, self._setup.controller
+        return (
+            self._run,
+            controller.control,
+            plant.world,
+            plant.bore,
+            self._safety.guard,
+            self._stop,
+            plant.watch.record,
+            plant.hooks.record,
+        )
 
     @property
     def time_s(self) -> float:
@@ -178,22 +194,8 @@ class Simulation:
         return min(ticks, BLOCK_TICKS - int(self._setup.plant.world.tick) % BLOCK_TICKS)
 
     def _advance_by(self, ticks: int) -> None:
-        plant, controller = self._setup.plant, self._setup.controller
-        plant.refill()
-        self._run_ticks(
-            ticks,
-            self._run,
-            controller.control,
-            plant.world,
-            plant.bore,
-            self._safety.guard,
-            self._stop,
-            plant.watch.record,
-            plant.hooks.record,
-            self._task.kernel,
-            *controller.kernels,
-            plant.advance,
-        )
+        self._setup.plant.refill()
+        self._run_ticks(ticks, *self.arguments)
         if self._run.progress.reason != GOING:
             self._ending = self._end(int(self._run.progress.reason))
 
@@ -237,7 +239,6 @@ class Simulation:
                 plant.bore,
                 self._stop,
                 plant.hooks.record,
-                plant.advance,
             )
             if self._run.progress.reason == PLANT_TOLD:
                 self._end(PLANT_TOLD)
@@ -248,7 +249,7 @@ class Simulation:
     def _ask(self) -> None:
         """The task's command for the present state."""
         c, world = self._setup.controller.control, self._setup.plant.world
-        status = self._ask_task(self._run, c, world, self._task.kernel)
+        status = self._ask_task(self._run, c, world)
         if status != GOES_ON:
             self._run.progress.status = status
             self._end(TASK_TOLD)

@@ -1,6 +1,6 @@
 """The control loop as one compiled function: command, safety, decision, row, plant, tick after tick.
 
-It holds no Python lock, calls MuJoCo by symbol and is given the parts' kernels as parameters. A part that is
+It holds no Python lock, calls MuJoCo by symbol and the parts' kernels by address. A part that is
 Python by nature is one of the kernels too: a trampoline that enters Python (`surgsim.tick.python_part`).
 """
 
@@ -12,23 +12,21 @@ import numpy as np
 from numba import types
 from numpy.typing import NDArray
 
-from surgsim.compiled import compiled
-from surgsim.control.decision import decide, part_types
+from surgsim.compiled import call_at, compiled
+from surgsim.control.decision import decide
 from surgsim.plant.bore import Bore
 from surgsim.plant.contacts import Watch
-from surgsim.plant.world import Hooks, advance_signature
+from surgsim.plant.world import Hooks
 from surgsim.simulate.safety import Guard, is_safe
 from surgsim.simulate.stop import Stop, brake
 from surgsim.tick.algebra import dot, times
 from surgsim.tick.arrays import (
     Control,
     Feedback,
-    Kernel,
     Numbers,
     Record,
     Seen,
     World,
-    task_signature,
     type_of,
 )
 from surgsim.tick.clock import thread_time
@@ -105,16 +103,20 @@ class Run(Record):
         progress: Where it is.
         feedback: What the task is told.
         at: Where the blocks of a row begin.
+        task: Address of the task's kernel.
+        advance: Of the plant's.
         rows: Address of the trace so far; what is never written stays NaN.
         columns: Width of a row.
         task_gains: The task's numbers.
         task_memory: Its memory.
     """
 
-    ADDRESSES: ClassVar[frozenset[str]] = frozenset(("rows",))
+    ADDRESSES: ClassVar[frozenset[str]] = frozenset(("task", "advance", "rows"))
     progress: Progress
     feedback: Feedback
     at: RowPlaces
+    task: int
+    advance: int
     rows: int
     columns: int
     task_gains: Numbers
@@ -125,30 +127,20 @@ class Run(Record):
 def run_signature(n: int) -> Any:
     """Signature of `run_ticks` for n joints."""
     records = [type_of(kind, n) for kind in (Control, World, Bore, Guard, Stop, Watch)]
-    return types.int64(
-        types.int64,
-        type_of(Run, 0),
-        *records,
-        type_of(Hooks, 0),
-        types.FunctionType(task_signature()),
-        *part_types(n),
-        types.FunctionType(advance_signature(n)),
-    )
+    return types.int64(types.int64, type_of(Run, 0), *records, type_of(Hooks, 0))
 
 
 @cache
 def ask_signature(n: int) -> Any:
     """Signature of `ask_task` for n joints."""
-    task = types.FunctionType(task_signature())
-    return types.int64(type_of(Run, 0), type_of(Control, n), type_of(World, n), task)
+    return types.int64(type_of(Run, 0), type_of(Control, n), type_of(World, n))
 
 
 @cache
 def hold_signature(n: int) -> Any:
     """Signature of `hold_ticks` for n joints."""
     records = [type_of(kind, n) for kind in (Control, World, Bore, Stop)]
-    advance = types.FunctionType(advance_signature(n))
-    return types.int64(types.int64, type_of(Run, 0), *records, type_of(Hooks, 0), advance)
+    return types.int64(types.int64, type_of(Run, 0), *records, type_of(Hooks, 0))
 
 
 @compiled
@@ -224,7 +216,7 @@ def _is_finite(values: Array) -> bool:
 
 
 @compiled
-def ask_task(run: Run, c: Control, world: World, task: Kernel) -> int:
+def ask_task(run: Run, c: Control, world: World) -> int:
     """The task's command for the present state, once a tick."""
     told = run.feedback
     told.t_s = world.t_s
@@ -237,19 +229,18 @@ def ask_task(run: Run, c: Control, world: World, task: Kernel) -> int:
             told.p_WT[i], told.f_T[i] = model.p_WT[i], world.f_T_m[i]
             for k in range(3):
                 told.R_WT[i, k] = model.R_WT[i, k]
-    status: int = task(numbers(run.task_gains), told, numbers(run.task_memory), c.command)
+    gains, memory = numbers(run.task_gains), numbers(run.task_memory)
+    status: int = call_at(run.task, gains, told, memory, c.command)
     return status
 
 
 @compiled
-def _act(
-    torque: Array, qdot: Array, jaw: float, world: World, bore: Bore, hooks: Hooks, advance: Kernel
-) -> int:
+def _act(run: Run, torque: Array, qdot: Array, jaw: float, world: World, bore: Bore, hooks: Hooks) -> int:
     """Hand the command to the plant and let one period pass."""
     for i in range(torque.size):
         world.torque[i], world.qdot[i] = torque[i], qdot[i]
     world.jaw = jaw
-    status: int = advance(world, bore, hooks)
+    status: int = call_at(run.advance, world, bore, hooks)
     return status
 
 
@@ -283,11 +274,6 @@ def run_ticks(
     stop: Stop,
     watch: Watch,
     hooks: Hooks,
-    task: Kernel,
-    estimator: Kernel,
-    resolver: Kernel,
-    law: Kernel,
-    advance: Kernel,
 ) -> int:
     """Run up to `ticks` ticks; how many rows were begun. `run.progress` says why it came back."""
     p, at = run.progress, run.at
@@ -302,7 +288,7 @@ def run_ticks(
         _measure(c.seen, world)
         timed = world.tick % p.clock_every == 0
         before = thread_time() if timed else math.nan
-        status = decide(c, estimator, resolver, law)
+        status = decide(c)
         took = thread_time() - before if timed else math.nan
         if status == GOES_ON:
             p.infeasible = 0
@@ -314,7 +300,7 @@ def run_ticks(
             if _is_last(p, c, world):
                 p.reason = DONE
                 return k + 1
-            status = _act(c.torque, c.resolved.qdot, c.command.jaw, world, bore, hooks, advance)
+            status = _act(run, c.torque, c.resolved.qdot, c.command.jaw, world, bore, hooks)
         else:
             row[at.infeasible] = 1.0 if _has_no_answer(status) else 0.0
             if status == TOLD or not _bridges(p, c, world, status):
@@ -326,11 +312,11 @@ def run_ticks(
             _put(row, at.q_ref, stop.q)
             if p.uses_torque:
                 _record_torque(row, at, world.tau_max, stop.torque)
-            status = _act(stop.torque, stop.qdot, c.command.jaw, world, bore, hooks, advance)
+            status = _act(run, stop.torque, stop.qdot, c.command.jaw, world, bore, hooks)
         if status != GOES_ON:
             p.reason, p.status = PLANT_TOLD, status
             return k + 1
-        status = ask_task(run, c, world, task)
+        status = ask_task(run, c, world)
         if status != GOES_ON:
             p.reason, p.status = TASK_TOLD, status
             return k + 1
@@ -338,9 +324,7 @@ def run_ticks(
 
 
 @compiled
-def hold_ticks(
-    ticks: int, run: Run, c: Control, world: World, bore: Bore, stop: Stop, hooks: Hooks, advance: Kernel
-) -> int:
+def hold_ticks(ticks: int, run: Run, c: Control, world: World, bore: Bore, stop: Stop, hooks: Hooks) -> int:
     """The stop after the outcome: rows without a command, until the state diverges; their number."""
     p, at = run.progress, run.at
     for k in range(ticks):
@@ -350,7 +334,7 @@ def hold_ticks(
         last = vector(run.rows + 8 * run.columns * (p.rows - 1), run.columns)
         if last[at.stopped] == 1.0:
             _record_torque(last, at, world.tau_max, stop.torque)
-        status = _act(stop.torque, stop.qdot, c.command.jaw, world, bore, hooks, advance)
+        status = _act(run, stop.torque, stop.qdot, c.command.jaw, world, bore, hooks)
         if status != GOES_ON:
             p.reason, p.status = PLANT_TOLD, status
             return k

@@ -6,7 +6,7 @@ import numpy as np
 from numba.core.dispatcher import Dispatcher
 from numpy.typing import NDArray
 
-from surgsim.compiled import as_parameter
+from surgsim.compiled import address_of
 from surgsim.tasks.base import Feedback, Task
 from surgsim.tasks.command import fill_command
 from surgsim.tick.arrays import task_signature
@@ -23,7 +23,7 @@ class BoundTask:
         command: Where its command goes.
 
     Attributes:
-        kernel: What the loop calls.
+        kernel: Address of what the loop calls.
         told: What the task is told; to be set by the loop.
         gains: Its numbers.
         memory: Its memory.
@@ -36,11 +36,11 @@ class BoundTask:
         self._entered: PythonPart | None = None
         self.memory: Array = getattr(task, "memory", np.zeros(0))
         if isinstance(kernel, Dispatcher):
-            self.kernel = as_parameter(kernel, task_signature())
+            self.kernel: int = address_of(kernel, task_signature())
             self.gains: Array = task.gains  # type: ignore[attr-defined]
         else:
             self._entered = PythonPart(self._call)
-            self.kernel, self.gains = as_parameter(python_kernel, task_signature()), self._entered.gains
+            self.kernel, self.gains = address_of(python_kernel, task_signature()), self._entered.gains
 
     @property
     def arrays(self) -> dict[str, Array]:

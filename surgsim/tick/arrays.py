@@ -374,9 +374,12 @@ class Command(Record):
 
 
 class Minds(Record):
-    """Numbers and memories of a controller's parts, and the terms of its torque.
+    """Kernels, numbers and memories of a controller's parts, and the terms of its torque.
 
     Attributes:
+        port: Address of the port estimator's kernel.
+        resolver: Of the resolver's.
+        law: Of the torque law's.
         port_gains: Of the port estimator.
         port_memory: Of the port estimator.
         resolver_gains: Of the resolver.
@@ -386,6 +389,10 @@ class Minds(Record):
         terms: Terms of the torque (k, n) [N m], row by row.
     """
 
+    ADDRESSES: ClassVar[frozenset[str]] = frozenset(("port", "resolver", "law"))
+    port: int
+    resolver: int
+    law: int
     port_gains: Numbers
     port_memory: Numbers
     resolver_gains: Numbers
@@ -405,7 +412,7 @@ class Control(Record):
         q_ref: Joint reference at this tick (n,) [rad].
         torque: Sum of the law's terms (n,) [N m].
         port: Rows position, velocity and acceleration of the estimated port (3, 3).
-        minds: Where the parts' numbers and memories are.
+        minds: Where the parts' kernels, numbers and memories are.
         command: The task's command.
         seen: What the parts see, one after the other: port estimator, resolver, torque law.
         referred: What the resolver sees where it is evaluated at the joint reference.

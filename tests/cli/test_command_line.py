@@ -102,7 +102,7 @@ WRONG = {
     ),
     "foreign folder": (["run", "circle_lwr4plus", "--out", "."], ". holds 'other.txt', which is not a run's"),
     "nothing recorded": (["inspect", "nowhere"], "nowhere"),
-    "bad bench": (["bench", "--duration", "0"], "bench needs a duration of at least 1 s"),
+    "bad bench": (["bench", "--duration", "0"], "bench needs a duration of at least 3 s"),
 }
 
 

@@ -35,8 +35,8 @@ NOT_HERE = {
     "surgsim compare full --engine ray --address 10.0.0.1:6379 --out runs/full": "needs a cluster",
     "python docs/images/controllers.py": DRAWS,
     "python docs/images/controllers.py frontier": DRAWS,
-    "python benchmarks/batch.py": "a measurement of the machine, for minutes",
-    "python benchmarks/batch.py --runs 100 --pairs 1": "a measurement of the machine, for minutes",
+    "surgsim bench --only ticks --against benchmarks/ratios.json": "a measurement of the machine",
+    "surgsim bench --only ticks --keep benchmarks/ratios.json": "a measurement of the machine",
 }
 # What is added to a command so that it ends soon: the same command otherwise.
 SHORT = "--set task.duration_s=3.0 --set task.hold_end_s=0.0"
@@ -62,8 +62,9 @@ SHORTER = {
     "--out runs/robustness": "--controllers vprnn",
     "surgsim compare frontier --seeds 0:1 --out runs/frontier": "--controllers joint_impedance",
     "surgsim compare torque_level --out runs/torque_level": "--controllers rcm_inverse_dynamics",
-    "surgsim bench": "--duration 1 --repeat 1",
-    "surgsim bench --duration 5 --repeat 3 --json": "--duration 1 --repeat 1",
+    "surgsim bench": "--duration 3",
+    "surgsim bench --only ticks,stages --cases circle/vprnn,kinematic/pinv": "--duration 3",
+    "surgsim bench --only libraries --json": "--duration 3",
 }
 SLOW = (
     "surgsim reproduce ",

@@ -82,7 +82,7 @@ def test_a_kernel_is_called_by_its_address(workshop):
         assert out.tolist() == [2.0, 4.0]
         refuse = address_of(module.refuse, module.STEP)
         assert module.loop(refuse, x, out) == 7
-        with pytest.raises(ValueError, match="^negative$"):
+        with pytest.raises(ValueError, match=r"^negative$"):
             module.loop(refuse, -x, out)
     assert workshop.compiled == []
 

@@ -107,10 +107,14 @@ OPTIONS = {
     "reproduce vprnn --out scenario.yaml": "scenario.yaml is a file; --out names a folder",
     "reproduce vprnn --out .": "which is not a study's; choose another --out",
     "reproduce vprnn --out '\0'": "cannot be used: embedded null byte",
-    "bench --duration nan": "bench needs a duration of at least 1 s",
+    "bench --duration nan": "bench needs a duration of at least 3 s",
     "bench --duration inf": "at most 3600 s",
     "bench --duration 1e300": "at most 3600 s",
     "bench --repeat 0": "and at least one repeat",
+    "bench --only tick": "'tick' is not a section of bench. Known: batch, libraries,",
+    "bench --cases circle/vprn": "Did you mean 'circle/vprnn'?",
+    "bench --only stages --keep kept.json": "are for the section ticks",
+    "bench --only ticks --against nowhere.json": "nowhere.json: No such file or directory",
 }
 GOOD_SUITE = f"name: made\nscenarios: [{S}]\n"
 SUITES = {

@@ -1,0 +1,69 @@
+"""The runs that are measured, by name."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from surgsim.errors import SurgsimError, unknown_name
+from surgsim.scenario.load import load_scenario, shipped
+from surgsim.scenario.schema import Scenario
+
+CIRCLE = "circle_lwr4plus"
+WHOLE = ("theatre_lwr4plus", "teleop_free_motion_panda")
+"""Scenarios that are measured with their own controller."""
+KINEMATIC = ("pinv", "gradient", "vprnn", "qp")
+"""Controllers that are measured on the kinematic plant too."""
+_NEEDS = {"rcm_interaction_force": ("trocar.wall={}",)}
+"""What a controller needs in the scenario to be run at all."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Case:
+    """A run that is measured.
+
+    Attributes:
+        name: What tables call it: a scenario, or `circle/` or `kinematic/` and a controller.
+        source: The shipped scenario.
+        controller: A shipped controller; None: the scenario's own.
+        settings: Values instead of the scenario's.
+    """
+
+    name: str
+    source: str
+    controller: str | None = None
+    settings: tuple[str, ...] = ()
+
+    def scenario(self, *settings: str) -> Scenario:
+        """The scenario, with further `settings`."""
+        return load_scenario(self.source, controller=self.controller, assignments=(*self.settings, *settings))
+
+
+def circle(controller: str) -> Case:
+    """The circle with a shipped controller."""
+    settings = _NEEDS.get(controller, ())
+    return Case(name=f"circle/{controller}", source=CIRCLE, controller=controller, settings=settings)
+
+
+def kinematic(controller: str) -> Case:
+    """The circle on the kinematic plant."""
+    settings = ("plant={type: kinematic}", "theatre=false")
+    return Case(name=f"kinematic/{controller}", source=CIRCLE, controller=controller, settings=settings)
+
+
+def all_cases() -> list[Case]:
+    """Every case, in the order of the tables."""
+    whole = [Case(name=name, source=name) for name in WHOLE]
+    return [*map(circle, shipped("controllers")), *whole, *map(kinematic, KINEMATIC)]
+
+
+def chosen(names: Sequence[str] | None) -> list[Case]:
+    """The cases of these names, in the order of the tables; all of them for None.
+
+    Raises:
+        SurgsimError: If one is not known.
+    """
+    cases = all_cases()
+    known = [case.name for case in cases]
+    for name in names or ():
+        if name not in known:
+            raise SurgsimError(unknown_name(name, "case", known))
+    return [case for case in cases if names is None or case.name in names]
