@@ -55,7 +55,7 @@ def _resolvers(times: int, c: Control) -> int:
 def _laws(times: int, c: Control) -> int:
     minds, n, status = c.minds, c.torque.size, 0
     gains, memory = numbers(minds.law_gains), numbers(minds.law_memory)
-    terms = doubles(minds.terms.address, minds.terms.size // n, n)
+    terms = doubles(minds.terms.address, minds.terms.length // n, n)
     for _ in range(times):
         status += call_at(minds.law, gains, c.seen, memory, terms)
     return status

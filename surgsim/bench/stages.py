@@ -24,8 +24,9 @@ STAGES = ("model", "port", "resolver", "law", "task", "mj_step", "plant", "safet
 """Stages whose times add up to the tick.
 
 Nominal model, port estimator, resolver, torque law, the task's command, MuJoCo, what else the plant does,
-safety limits, the two readings of the clock, entering the loop once a chunk, and the rest: kinematics of the
-remote centre, velocity bounds, the trace's row. As what is left of the tick, it carries the others' errors.
+safety limits, the two readings of the clock where they are taken, entering the loop once a chunk, and the
+rest: kinematics of the remote centre, velocity bounds, the trace's row. As what is left of the tick, it
+carries the others' errors.
 """
 
 
@@ -62,7 +63,9 @@ def measure_stages(case: Case, duration_s: float) -> Row:
         found.append(times)
     if len(found) < 2:
         raise SurgsimError(f"{case.name}: the run ended before two chunks of {CHUNK} ticks")
+    clock_every = int(simulation.arguments[0].progress.clock_every)
     medians = {name: 1e6 / CHUNK * float(np.median([t[name] for t in found[1:]])) for name in found[0]}
+    medians["clock"] /= clock_every
     return {"case": case.name, "tick": medians["tick"], **_shares(medians)}
 
 

@@ -61,7 +61,7 @@ def decide(c: Control) -> int:
         seen.v_WTd[:] = c.resolved.v_WTd
         seen.a_WTd[:] = c.resolved.a_WTd
         n = c.torque.size
-        terms = doubles(minds.terms.address, minds.terms.size // n, n)
+        terms = doubles(minds.terms.address, minds.terms.length // n, n)
         status = call_at(minds.law, numbers(minds.law_gains), seen, numbers(minds.law_memory), terms)
         if status != GOES_ON:
             return status

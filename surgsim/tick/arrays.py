@@ -57,6 +57,7 @@ def layout(kind: Any, n: int) -> np.dtype[Any]:
         raise SurgsimError(f"the arm has {n} joints; at most {MOST_JOINTS} are supported")
     fields: list[tuple[Any, ...]] = []
     for name, hint in get_type_hints(kind).items():
+        assert not hasattr(np.void, name), f"{kind.__name__}.{name} hides what NumPy calls so"
         if name in kind.SHAPES:
             shape = tuple(n if size == "n" else int(size) for size in kind.SHAPES[name].split())
             fields.append((name, np.float64, shape))
@@ -87,17 +88,17 @@ class Numbers(Record):
 
     Attributes:
         address: Of its first entry.
-        size: How many entries.
+        length: How many entries.
     """
 
     ADDRESSES: ClassVar[frozenset[str]] = frozenset(("address",))
     address: int
-    size: int
+    length: int
 
 
 def point(where: Any, array: Array) -> None:
     """Fill in where `array`, contiguous, is; `where` is a record of `Numbers`."""
-    where.address, where.size = array.ctypes.data, array.size
+    where.address, where.length = array.ctypes.data, array.size
 
 
 class Model(Record):

@@ -54,8 +54,8 @@ def _integers(address: Any, size: Any) -> Any:
 
 @compiled
 def numbers(where: Numbers) -> Array:
-    """The array that is there (size,), not copied."""
-    return vector(where.address, where.size)
+    """The array that is there (length,), not copied."""
+    return vector(where.address, where.length)
 
 
 @compiled

@@ -60,7 +60,8 @@ def test_bare_steps_begin_at_the_state_of_the_run_and_leave_it_alone():
 def test_stages_add_up_to_the_tick():
     row = measure_stages(chosen(["circle/pinv"])[0], SHORT_S)
     assert math.isclose(sum(row[name] for name in STAGES), row["tick"], rel_tol=1e-9)
-    assert min(row[name] for name in STAGES if name != "rest") >= 0.0
+    differences = {"plant", "rest"}  # of two measurements each
+    assert min(row[name] for name in STAGES if name not in differences) >= 0.0
     assert min(row["model"], row["mj_step"], row["resolver"]) > 0.0
 
 
