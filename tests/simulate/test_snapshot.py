@@ -15,6 +15,7 @@ from surgsim.simulate.setup import prepare
 SHORT = ("task.duration_s=1", "task.ramp_s=0.2", "task.hold_start_s=0.1", "task.hold_end_s=0.1")
 NOISE = ("disturbances=[{type: sensor_noise}, {type: payload, spread: 0.5}]",)
 CONTROLLERS = ("pinv", "gradient", "rnn", "vprnn", "qp", "passive_convex", "rcm_inverse_dynamics", "mink")
+CONTROLLERS += ("self_motion",)
 
 
 def _begun(scenario, ticks):
