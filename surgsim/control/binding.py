@@ -203,22 +203,23 @@ def _port_call(port: Any, c: Any, minds: PartArrays, remembered: dict[int, Any])
 def _resolver_call(
     parts: ControllerParts, c: Any, minds: PartArrays, arm: ArmModel, remembered: dict[int, Any]
 ) -> Callable[[], int | None]:
-    resolver, seen = parts.resolver, c.referred if c.at_reference else c.seen
+    resolver, seen, out = parts.resolver, c.referred if c.at_reference else c.seen, c.resolved
+    limits = arm.limits
     if hasattr(resolver, "kernel"):
-        return lambda: resolver.kernel(resolver.gains, seen, minds.resolver_memory, c.resolved)
+        return lambda: resolver.kernel(resolver.gains, seen, minds.resolver_memory, out)
 
     def call() -> None:
-        problem = velocity_problem_of(seen, arm.limits)
-        if seen.first:
+        problem = velocity_problem_of(seen, limits)
+        if seen["first"]:
             remembered[SOLVER] = resolver.start(problem)
         found: Resolution
         found, remembered[SOLVER] = resolver.step(problem, remembered[SOLVER])
-        out = c.resolved
-        out.qdot[:], out.residual = found.qdot, found.residual
-        out.values[: found.values.size] = found.values
+        out["qdot"], out["residual"] = found.qdot, found.residual
+        if found.values.size:
+            out["values"][: found.values.size] = found.values
         if found.command is not None:
             told = found.command
-            out.p_WTd[:], out.v_WTd[:], out.a_WTd[:] = told.p_WTd, told.v_WTd, told.a_WTd
+            out["p_WTd"], out["v_WTd"], out["a_WTd"] = told.p_WTd, told.v_WTd, told.a_WTd
 
     return call
 

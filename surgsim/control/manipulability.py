@@ -17,14 +17,17 @@ from surgsim.models.arm import Kinematics
 from surgsim.tick.algebra import back_substitute_rows, determinant, dot, factor, outer_product
 from surgsim.tick.arrays import Model
 from surgsim.tick.nominal import kinematics
-from surgsim.tick.scratch import scratch_matrix
+from surgsim.tick.scratch import scratch, scratch_matrix
 
 Array = NDArray[np.float64]
 
 
+@compiled
 def manipulability(J: Array) -> float:
     """Mu = sqrt(det(J J^T)) of a Jacobian (m, n); eq. (5) of the VPRNN paper."""
-    return float(np.sqrt(max(np.linalg.det(J @ J.T), 0.0)))
+    A = np.empty((J.shape[0], J.shape[0]))
+    outer_product(J, J, A)
+    return math.sqrt(max(determinant(A), 0.0))
 
 
 @compiled
@@ -101,26 +104,120 @@ def _diamond_row(J: Array, h: Array, out: Array) -> None:
 def fill_log_manipulability_gradient(J: Array, z: Array, out: Array) -> bool:
     """Gradient of ln(mu) of the translational Jacobian, `out` (n,) [1/rad]; False if J has lost rank.
 
-    d(ln mu)/dq_i = tr(dJ/dq_i J^T (J J^T)^-1), equal to (J <> h) psi with psi = vec((J J^T)^-1).
+        d(ln mu)/dq_i = tr(dJ/dq_i J^T (J J^T)^-1) = z_i . sum_{j>=i} J_j x B_j + J_i . sum_{j<i} B_j x z_j
+
+    with the rows B_j = (J J^T)^-1 J_j. Equal to (J <> h) psi with psi = vec((J J^T)^-1).
     """
-    n = J.shape[1]
-    A, B = scratch_matrix(3, 3), scratch_matrix(n, 3)
+    columns, B = scratch_matrix(J.shape[1], 3), scratch_matrix(J.shape[1], 3)
+    if not fill_weighted_columns(J, columns, B):
+        return False
+    fill_gradient(columns, z, B, out)
+    return True
+
+
+@compiled
+def fill_weighted_columns(J: Array, columns: Array, B: Array) -> bool:
+    """Rows J_j (n, 3) of J (3, n), and rows B_j = (J J^T)^-1 J_j (n, 3); False if J has lost rank."""
+    A, inverse = scratch_matrix(3, 3), scratch_matrix(3, 3)
+    inverse[:] = 0.0
     outer_product(J, J, A)
     if not factor(A):
         return False
+    for a in range(3):
+        inverse[a, a] = 1.0
+    back_substitute_rows(A, inverse)
+    for j in range(J.shape[1]):
+        for a in range(3):
+            columns[j, a] = J[a, j]
+            B[j, a] = inverse[a, 0] * J[0, j] + inverse[a, 1] * J[1, j] + inverse[a, 2] * J[2, j]
+    return True
+
+
+@compiled
+def fill_gradient(J: Array, z: Array, B: Array, out: Array) -> None:
+    """Fill the gradient of ln(mu) (n,) from rows J_j, z_j and B_j (n, 3), see above."""
+    below, above = scratch_matrix(1, 3), scratch_matrix(1, 3)
+    below[:], above[:] = 0.0, 0.0
+    for i in range(out.size):
+        out[i] = _dot(J, i, below, 0)
+        _add_cross(B, i, z, i, below, 0)
+    for i in range(out.size - 1, -1, -1):
+        _add_cross(J, i, B, i, above, 0)
+        out[i] += _dot(z, i, above, 0)
+
+
+@compiled
+def fill_chain_slope(J: Array, z: Array, way: Array, dJ: Array, dz: Array, tip: Array) -> None:
+    """Derivatives along `way` (n,) of a revolute chain's rows J_j and z_j (n, 3), and of its tip.
+
+        dz_j = w_j x z_j,   dJ_j = w_j x J_j + z_j x sum_{i>j} way_i J_i,   w_j = sum_{i<=j} way_i z_i
+
+    Rows of `tip` (2, 3): its displacement and its turn, each by `way`.
+    """
+    n = way.size
+    tip[:] = 0.0
+    dJ[:] = 0.0
+    dz[:] = 0.0
     for j in range(n):
         for a in range(3):
-            B[j, a] = J[a, j]
-    back_substitute_rows(A, B)
-    h = scratch_matrix(3, n)
-    for i in range(n):
-        fill_jacobian_gradient(J, z, i, h)
-        s = 0.0
+            tip[1, a] += way[j] * z[j, a]
+        _add_cross(tip, 1, z, j, dz, j)
+        _add_cross(tip, 1, J, j, dJ, j)
+    for j in range(n - 1, -1, -1):
+        _add_cross(z, j, tip, 0, dJ, j)
         for a in range(3):
-            for b in range(n):
-                s += B[b, a] * h[a, b]
-        out[i] = s
-    return True
+            tip[0, a] += way[j] * J[j, a]
+
+
+@compiled
+def fill_gradient_slope(J: Array, z: Array, B: Array, dJ: Array, dz: Array, out: Array) -> None:
+    """Derivative of the gradient of ln(mu), `out` (n,), where the rows J_j and z_j change by dJ_j and dz_j.
+
+    The product rule on `fill_gradient`, with dB_j = A^-1 (dJ_j - dA B_j), A = J J^T and A^-1 = sum B_j B_j^T.
+    """
+    n = out.size
+    dA, inverse, dB, gap = scratch_matrix(3, 3), scratch_matrix(3, 3), scratch_matrix(n, 3), scratch(3)
+    dA[:], inverse[:] = 0.0, 0.0
+    for j in range(n):
+        for a in range(3):
+            for b in range(3):
+                dA[a, b] += dJ[j, a] * J[j, b] + J[j, a] * dJ[j, b]
+                inverse[a, b] += B[j, a] * B[j, b]
+    for j in range(n):
+        for a in range(3):
+            gap[a] = dJ[j, a] - dA[a, 0] * B[j, 0] - dA[a, 1] * B[j, 1] - dA[a, 2] * B[j, 2]
+        for a in range(3):
+            dB[j, a] = inverse[a, 0] * gap[0] + inverse[a, 1] * gap[1] + inverse[a, 2] * gap[2]
+    below, above = scratch_matrix(2, 3), scratch_matrix(2, 3)  # the sums, and their derivatives
+    below[:], above[:] = 0.0, 0.0
+    for i in range(n):
+        out[i] = _dot(dJ, i, below, 0) + _dot(J, i, below, 1)
+        _add_cross(B, i, z, i, below, 0)
+        _add_cross(dB, i, z, i, below, 1)
+        _add_cross(B, i, dz, i, below, 1)
+    for i in range(n - 1, -1, -1):
+        _add_cross(J, i, B, i, above, 0)
+        _add_cross(dJ, i, B, i, above, 1)
+        _add_cross(J, i, dB, i, above, 1)
+        out[i] += _dot(dz, i, above, 0) + _dot(z, i, above, 1)
+
+
+@compiled
+def _dot(A: Array, i: int, B: Array, j: int) -> float:
+    """Product of row i of A and row j of B, each of three."""
+    product: float = A[i, 0] * B[j, 0] + A[i, 1] * B[j, 1] + A[i, 2] * B[j, 2]
+    return product
+
+
+@compiled
+def _add_cross(A: Array, i: int, B: Array, j: int, out: Array, k: int) -> None:
+    """Row k of `out` += row i of A x row j of B."""
+    x = A[i, 1] * B[j, 2] - A[i, 2] * B[j, 1]
+    y = A[i, 2] * B[j, 0] - A[i, 0] * B[j, 2]
+    w = A[i, 0] * B[j, 1] - A[i, 1] * B[j, 0]
+    out[k, 0] += x
+    out[k, 1] += y
+    out[k, 2] += w
 
 
 def log_manipulability_gradient(J: Array, z: Array) -> Array:

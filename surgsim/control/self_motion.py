@@ -9,14 +9,29 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from surgsim.control.manipulability import log_manipulability_gradient, manipulability
-from surgsim.control.qp import DenseQp
-from surgsim.control.rcm import rcm_kinematics
+from surgsim.control.manifold import (
+    CLIMB_STEPS,
+    CLIMB_TOLERANCE_RAD,
+    PROJECTION_STEPS,
+    Manifold,
+    climb,
+    climb_from,
+    fill_constraints,
+    is_inside,
+    project,
+)
+from surgsim.control.manipulability import manipulability
 from surgsim.models.arm import ArmModel, Kinematics
 from surgsim.spatial import cross, unit
+from surgsim.tick.algebra import null_space
+from surgsim.tick.arrays import Model, new
+from surgsim.tick.nominal import kinematics
 
 Array = NDArray[np.float64]
+MARGIN_RAD = 0.002
+"""Distance that self-motion keeps from the joint limits."""
 _AT_REST = np.zeros(3)
+_SEARCH_SEED = 20_240_917
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -24,9 +39,9 @@ class SelfMotionPoint:
     """A configuration on the manifold.
 
     Attributes:
-        q: Joint positions (7,) [rad].
+        q: Joint positions (n,) [rad].
         miss: Norm of what the constraints lack [m].
-        mu: Manipulability of the 3x7 tip Jacobian.
+        mu: Manipulability of the 3xn tip Jacobian.
         kin: Kinematics at `q`.
     """
 
@@ -44,90 +59,42 @@ class SelfMotion:
         margin_rad: Distance kept from the joint limits [rad].
     """
 
-    def __init__(self, arm: ArmModel, margin_rad: float = 0.002) -> None:
+    def __init__(self, arm: ArmModel, margin_rad: float = MARGIN_RAD) -> None:
         self._arm = arm
+        self._model = new(Model, arm.limits.q_min.size)
+        arm.point(self._model, shared=True)
         self._low = arm.limits.q_min + margin_rad
         self._high = arm.limits.q_max - margin_rad
 
-    def rows(self, kin: Kinematics, p_WT: Array, p_WC: Array | None) -> tuple[Array, Array]:
-        """Constraint Jacobian (3 or 5, 7) and residual (3 or 5,) [m] for tip and trocar positions."""
-        residual = kin.p_WT - p_WT
-        if p_WC is None:
-            return kin.Jv_WT, residual
-        rcm = rcm_kinematics(kin, p_WC, _AT_REST)
-        return np.concatenate((kin.Jv_WT, rcm.jacobian)), np.concatenate((residual, rcm.error))
+    def project(
+        self, q: Array, p_WT: Array, p_WC: Array | None, steps: int = PROJECTION_STEPS
+    ) -> SelfMotionPoint:
+        """The point of the manifold near `q` (n,) [rad]: Newton steps of least joint motion.
 
-    def project(self, q: Array, p_WT: Array, p_WC: Array | None, steps: int = 8) -> SelfMotionPoint:
-        """The point of the manifold near `q` (7,) [rad]: Newton steps of least joint motion."""
-        kin = self._arm.kinematics(q)
-        J, residual = self.rows(kin, p_WT, p_WC)
-        for _ in range(steps):
-            if residual @ residual < 1e-24:
-                break
-            q = q - J.T @ np.linalg.solve(J @ J.T, residual)
-            kin = self._arm.kinematics(q)
-            J, residual = self.rows(kin, p_WT, p_WC)
-        return SelfMotionPoint(
-            q=q, miss=float(np.linalg.norm(residual)), mu=manipulability(kin.Jv_WT), kin=kin
-        )
-
-    def improve(self, point: SelfMotionPoint, p_WT: Array, p_WC: Array | None, radius: float) -> Array:
-        """Joint displacement (7,) [rad] towards larger mu, tangent to the manifold, inside the limits.
-
-        A Newton step on ln(mu) with the curvature of the manifold through the Lagrangian, its eigenvalues
-        made positive, at most `radius` [rad] long.
+        Raises:
+            numpy.linalg.LinAlgError: If the arm is singular there.
         """
-        J, _ = self.rows(point.kin, p_WT, p_WC)
-        gradient = log_manipulability_gradient(point.kin.Jv_WT, point.kin.z_W)
-        Z: Array = np.asarray(np.linalg.qr(J.T, mode="complete")[0][:, len(J) :], dtype=np.float64)
-        multiplier = np.linalg.solve(J @ J.T, J @ gradient)
-        curvature: Array = -Z.T @ self._slopes(point.q, Z, np.asarray(multiplier), p_WT, p_WC)
-        eigenvalues, V = np.linalg.eigh(0.5 * (curvature + curvature.T))
-        w: Array = np.maximum(np.abs(eigenvalues), 0.05)
-        reduced = Z.T @ gradient
-        step: Array = Z @ (V @ ((V.T @ reduced) / w))
-        length = float(np.linalg.norm(step))
-        step = step * min(1.0, radius / max(length, 1e-12))
-        if (point.q + step >= self._low).all() and (point.q + step <= self._high).all():
-            return step
-        return self._bounded_step(point.q, Z, np.asarray(V * w @ V.T), reduced, radius)
-
-    def _slopes(self, q: Array, Z: Array, multiplier: Array, p_WT: Array, p_WC: Array | None) -> Array:
-        """Derivative of grad(ln mu) - J^T multiplier along the columns of Z (7, k), central differences."""
-        slopes = np.empty(Z.shape)
-        for k in range(Z.shape[1]):
-            ends = []
-            for sign in (1.0, -1.0):
-                kin = self._arm.kinematics(q + sign * _DIFFERENCE_RAD * Z[:, k])
-                J, _ = self.rows(kin, p_WT, p_WC)
-                ends.append(log_manipulability_gradient(kin.Jv_WT, kin.z_W) - J.T @ multiplier)
-            slopes[:, k] = (ends[0] - ends[1]) / (2.0 * _DIFFERENCE_RAD)
-        return slopes
-
-    def _bounded_step(self, q: Array, Z: Array, B: Array, reduced: Array, radius: float) -> Array:
-        """The step inside joint limits and a box of `radius`; zero if there is none."""
-        box = np.full(len(reduced), radius)
-        y = DenseQp().solve(0.5 * (B + B.T), -reduced, -box, box, Z, self._low - q, self._high - q)
-        return np.zeros(7) if y is None else Z @ y
+        q = np.array(q, dtype=np.float64)
+        ranked, miss = project(self._model, self._on(p_WT, p_WC), q, steps)
+        return self._point(q, ranked, miss)
 
     def climb(
-        self, q: Array, p_WT: Array, p_WC: Array | None, *, steps: int = 60, tolerance_rad: float = 1e-9
+        self,
+        q: Array,
+        p_WT: Array,
+        p_WC: Array | None,
+        *,
+        steps: int = CLIMB_STEPS,
+        tolerance_rad: float = CLIMB_TOLERANCE_RAD,
     ) -> SelfMotionPoint:
-        """The local maximum of mu that is reached from `q` (7,) [rad] by self-motion inside the limits."""
-        point = self.project(q, p_WT, p_WC)
-        radius = 0.3
-        for _ in range(steps):
-            step = self.improve(point, p_WT, p_WC, radius)
-            if step @ step < tolerance_rad**2:
-                break
-            trial = self.project(np.clip(point.q + step, self._low, self._high), p_WT, p_WC)
-            if self._is_better(trial, point):
-                point, radius = trial, min(2.0 * radius, 0.3)
-            else:
-                radius *= 0.25
-                if radius < tolerance_rad:
-                    break
-        return point
+        """The local maximum of mu that is reached from `q` (n,) [rad] by self-motion inside the limits.
+
+        Raises:
+            numpy.linalg.LinAlgError: If the arm is singular on the way.
+        """
+        q = np.array(q, dtype=np.float64)
+        ranked, miss, _ = climb(self._model, self._on(p_WT, p_WC), q, steps, tolerance_rad)
+        return self._point(q, ranked, miss)
 
     def optima(
         self, here: SelfMotionPoint, p_WT: Array, p_WC: Array | None, starts: int
@@ -135,46 +102,35 @@ class SelfMotion:
         """Local maxima of mu that can be reached from `here` by self-motion inside the limits.
 
         Climbs from `here` and from `starts` random configurations around it (the same ones every time), and
-        keeps what `reaches` confirms.
+        keeps those that stepping along the joint-space line, each time back on the manifold, arrives at.
+
+        Raises:
+            numpy.linalg.LinAlgError: If the arm is singular uphill of `here`.
         """
-        rng = np.random.default_rng(_SEARCH_SEED)
         first = self.climb(here.q, p_WT, p_WC)
         found = [first] if self.inside(first) else []
-        for _ in range(starts):
-            guess = np.clip(here.q + rng.normal(size=7), self._low, self._high)
-            guess[6] = here.q[6]
-            point = self.climb(guess, p_WT, p_WC)
-            if self.inside(point) and self.reaches(here, point, p_WT, p_WC):
-                found.append(point)
+        on = self._on(p_WT, p_WC)
+        for offset in search_offsets(starts, here.q.size):
+            goal = np.empty(here.q.size)
+            counts, miss, _ = climb_from(self._model, on, here.q, here.mu, offset, goal)
+            if counts:
+                found.append(self._point(goal, True, miss))
         return found
-
-    def _is_better(self, trial: SelfMotionPoint, point: SelfMotionPoint) -> bool:
-        """Whether `trial` has a larger mu inside the limits, or is nearer to their inside."""
-        outside = self._outside(point)
-        if outside > 1e-6:
-            return trial.miss < 1e-8 and self._outside(trial) < 0.9 * outside
-        return trial.mu > point.mu and self.inside(trial)
-
-    def _outside(self, point: SelfMotionPoint) -> float:
-        """How far the worst joint is outside its range [rad]."""
-        return float(np.max(np.maximum(np.maximum(self._low - point.q, point.q - self._high), 0.0)))
 
     def inside(self, point: SelfMotionPoint) -> bool:
         """Whether `point` is on the manifold and inside the joint limits."""
-        return self._outside(point) <= 1e-6 and point.miss < 1e-8
+        return bool(is_inside(self._on(_AT_REST, None), point.q, point.miss))
 
-    def reaches(self, here: SelfMotionPoint, goal: SelfMotionPoint, p_WT: Array, p_WC: Array | None) -> bool:
-        """Whether stepping along the joint-space line to `goal`, each time back on the manifold, arrives.
+    def _on(self, p_WT: Array, p_WC: Array | None) -> Manifold:
+        tip = np.array(p_WT, dtype=np.float64)
+        port = tip if p_WC is None else np.array(p_WC, dtype=np.float64)
+        return Manifold(rows=3 if p_WC is None else 5, p_WT=tip, p_WC=port, low=self._low, high=self._high)
 
-        A path that comes near a singularity (mu below half of where it began) does not count.
-        """
-        q, lowest = here.q, 0.5 * min(here.mu, goal.mu)
-        for left in range(40, 0, -1):
-            point = self.project(q + (goal.q - q) / left, p_WT, p_WC, steps=4)
-            if point.miss > 1e-4 or point.mu < lowest:
-                return False
-            q = point.q
-        return bool(np.max(np.abs(q - goal.q)) < 0.1)
+    def _point(self, q: Array, ranked: bool, miss: float) -> SelfMotionPoint:
+        if not ranked:
+            raise np.linalg.LinAlgError("Singular matrix")
+        kin = self._arm.kinematics(q)
+        return SelfMotionPoint(q=q, miss=miss, mu=manipulability(kin.Jv_WT), kin=kin)
 
     def swivel_curve(
         self, q: Array, p_WT: Array, p_WC: Array, step_rad: float = 0.02, most: int = 2000
@@ -207,9 +163,15 @@ class SelfMotion:
         return points, False
 
     def _swivel(self, point: SelfMotionPoint, p_WT: Array, p_WC: Array) -> Array:
-        """Unit joint direction (7,) of self-motion without the instrument's roll."""
-        J, _ = self.rows(point.kin, p_WT, p_WC)
-        return np.asarray(np.linalg.qr(np.vstack([J, _ROLL]).T, mode="complete")[0][:, -1])
+        """Unit joint direction (n,) of self-motion without the instrument's roll."""
+        n = point.q.size
+        rows, left = np.empty((6, n)), np.empty((n - 6, n))
+        kinematics(self._model, point.q)
+        fill_constraints(self._model, self._on(p_WT, p_WC), rows[:5], np.empty(5))
+        rows[5] = np.eye(n)[n - 1]
+        null_space(rows, left)
+        way: Array = left[-1]
+        return way
 
 
 def elbow_swivel_rad(kin: Kinematics) -> float:
@@ -222,6 +184,6 @@ def elbow_swivel_rad(kin: Kinematics) -> float:
     return float(np.arctan2(cross(axis, up) @ out, up @ out))
 
 
-_DIFFERENCE_RAD = 1e-4
-_SEARCH_SEED = 20_240_917
-_ROLL = np.eye(7)[6]
+def search_offsets(starts: int, n: int) -> Array:
+    """Random joint displacements (starts, n) [rad] to begin a search from, the same ones every time."""
+    return np.random.default_rng(_SEARCH_SEED).normal(size=(starts, n))

@@ -20,7 +20,8 @@ SKIN_MARGIN_M = 0.1
 """How far from the port the shaft may pass the skin; nearer is the RCM limit's matter."""
 NOTHING, _BODY, _TABLE, _SKIN = -9, -1, -2, -3
 _TERNARY_STEPS = 24
-_ROUNDING_M = 1e-9
+_INEXACT_M = 1e-4
+"""More than what rounding and the ternary search leave open in a distance."""
 
 
 class Watch(Record):
@@ -103,7 +104,7 @@ class ContactWatch:
         Args:
             p_WC: Port (3,) [m], which patient and table move with; not used without one.
         """
-        a, b, depth = forbidden_contact(self.record, p_WC)
+        a, b, depth, _ = forbidden_contact(self.record, p_WC)
         return None if b == NOTHING else self._contact(a, b, 1e3 * depth)
 
     def _contact(self, a: int, b: int, depth_mm: float) -> Contact:
@@ -159,12 +160,13 @@ def is_clear(watch: Watch, world: World) -> bool:
             + (world.p_WC[2] - watch.p_WC[2]) ** 2
         )
     if not used < watch.clearance:
-        found: bool = forbidden_contact(watch, world.p_WC)[1] == NOTHING
+        _, other, _, room = forbidden_contact(watch, world.p_WC)
+        watch.clearance = room - _INEXACT_M
         for i in range(world.q.size):
             watch.q[i] = world.q[i]
         for i in range(3):
             watch.p_WC[i] = world.p_WC[i]
-        return found
+        return other == NOTHING
     if not watch.has_patient or watch.shaft < 0:
         return True
     ends = doubles(watch.ends, 2 * watch.count, 3)
@@ -199,14 +201,13 @@ def _into_patient(watch: Watch, i: int, p_WC: Array, ends: Array) -> None:
 
 
 @compiled
-def forbidden_contact(watch: Watch, p_WC: Array) -> tuple[int, int, float]:
+def forbidden_contact(watch: Watch, p_WC: Array) -> tuple[int, int, float, float]:
     """Capsule, what it touches and how deep [m], for a port at `p_WC` (3,) [m]; `NOTHING`: all is well.
 
-    The room that was found is written to `watch.clearance`, 0 where something touches.
+    The last number is the room that is left [m], 0 where something touches.
     """
     ends, radii = doubles(watch.ends, 2 * watch.count, 3), vector(watch.radii, watch.count)
     pairs, shaft, patient = integers(watch.pairs, 2 * watch.pair_count), watch.shaft, watch.patient
-    watch.clearance = 0.0
     room = math.inf
     for i in range(watch.count):
         _place(watch, i, ends)
@@ -215,29 +216,27 @@ def forbidden_contact(watch: Watch, p_WC: Array) -> tuple[int, int, float]:
         reach = radii[i] + radii[j]
         square = segment_distance_squared(ends[2 * i], ends[2 * i + 1], ends[2 * j], ends[2 * j + 1])
         if square < reach * reach:
-            return i, j, reach - math.sqrt(square)
+            return i, j, reach - math.sqrt(square), 0.0
         room = min(room, math.sqrt(square) - reach)
     if not watch.has_patient:
-        watch.clearance = room - _ROUNDING_M
-        return 0, NOTHING, 0.0
+        return 0, NOTHING, 0.0, room
     for i in range(2, watch.count):
         _into_patient(watch, i, p_WC, ends)
         p0, p1 = ends[2 * i], ends[2 * i + 1]
         gap = table_gap(p0, p1, radii[i], patient[3], patient[4])
         if gap < 0.0:
-            return i, _TABLE, -gap
+            return i, _TABLE, -gap, 0.0
         room = min(room, gap)
         if i != shaft:
             gap = body_gap(p0, p1, radii[i], patient[2])
             if gap < 0.0:
-                return i, _BODY, -gap
+                return i, _BODY, -gap, 0.0
             room = min(room, gap)
     if shaft >= 0:
         beside = skin_distance(ends[2 * shaft], ends[2 * shaft + 1], patient)
         if beside > SKIN_MARGIN_M:
-            return shaft, _SKIN, beside
-    watch.clearance = room - _ROUNDING_M
-    return 0, NOTHING, 0.0
+            return shaft, _SKIN, beside, 0.0
+    return 0, NOTHING, 0.0, room
 
 
 @compiled
@@ -289,7 +288,7 @@ def body_gap(p0: Array, p1: Array, radius: float, semi_axes: Array) -> float:
 
 @compiled
 def table_gap(p0: Array, p1: Array, radius: float, centre: Array, half: Array) -> float:
-    """A lower bound of the distance [m] of a capsule from the box; minus the radius if its axis enters."""
+    """A lower bound of the distance [m] of a capsule from the box but for 0.02 mm; minus the radius inside."""
     length = 0.0
     for j in range(3):
         length += (p1[j] - p0[j]) ** 2

@@ -1,38 +1,37 @@
 """A task's command as the record of a tick and as an object."""
 
+import math
 from typing import Any
-
-import numpy as np
 
 from surgsim.tasks.base import EnergyBudget, TipCommand
 
 
 def fill_command_of(out: Any, command: TipCommand) -> None:
     """Write a command into a `Command` or `Seen`, a shift of the remote centre left out."""
-    out.p_WTd[:], out.v_WTd[:], out.a_WTd[:] = command.p_WTd, command.v_WTd, command.a_WTd
-    out.roll_rate, out.jaw = command.roll_rate, command.jaw
+    out["p_WTd"], out["v_WTd"], out["a_WTd"] = command.p_WTd, command.v_WTd, command.a_WTd
+    out["roll_rate"], out["jaw"] = command.roll_rate, command.jaw
     budget = command.budget
-    out.budget_j = np.inf if budget is None else budget.most_j
-    out.budget_f_T[:] = 0.0 if budget is None else budget.f_T
+    out["budget_j"] = math.inf if budget is None else budget.most_j
+    out["budget_f_T"] = 0.0 if budget is None else budget.f_T
 
 
 def fill_command(out: Any, command: TipCommand) -> None:
     """Write a command into a `Command`."""
     fill_command_of(out, command)
-    out.rcm_shift[:] = 0.0 if command.rcm_shift is None else command.rcm_shift
-    out.rcm_shift_rate[:] = 0.0 if command.rcm_shift_rate is None else command.rcm_shift_rate
+    out["rcm_shift"] = 0.0 if command.rcm_shift is None else command.rcm_shift
+    out["rcm_shift_rate"] = 0.0 if command.rcm_shift_rate is None else command.rcm_shift_rate
 
 
 def command_of(told: Any) -> TipCommand:
     """A copy of the command in a `Command` or `Seen`; a shift of the remote centre is left out."""
-    budget = None
-    if np.isfinite(told.budget_j):
-        budget = EnergyBudget(most_j=float(told.budget_j), f_T=told.budget_f_T.copy())
+    budget, most_j = None, float(told["budget_j"])
+    if math.isfinite(most_j):
+        budget = EnergyBudget(most_j=most_j, f_T=told["budget_f_T"].copy())
     return TipCommand(
-        p_WTd=told.p_WTd.copy(),
-        v_WTd=told.v_WTd.copy(),
-        a_WTd=told.a_WTd.copy(),
-        roll_rate=float(told.roll_rate),
-        jaw=float(told.jaw),
+        p_WTd=told["p_WTd"].copy(),
+        v_WTd=told["v_WTd"].copy(),
+        a_WTd=told["a_WTd"].copy(),
+        roll_rate=float(told["roll_rate"]),
+        jaw=float(told["jaw"]),
         budget=budget,
     )

@@ -14,6 +14,7 @@ from surgsim.tick.scratch import scratch, scratch_matrix
 Array = NDArray[np.float64]
 DEPENDENT = 1e-14
 """A pivot below this share of its diagonal entry counts as lost rank."""
+_SWEEPS = 20  # Jacobi's method needs about six
 
 
 @compiled
@@ -198,3 +199,79 @@ def determinant(A: Array) -> float:
             for j in range(k + 1, n):
                 A[i, j] -= c * A[k, j]
     return product
+
+
+@compiled
+def null_space(J: Array, Z: Array) -> None:
+    """Rows of Z (n - m, n) = an orthonormal basis of the null space of J (m, n): Householder's reflections.
+
+    H_m .. H_1 J^T = (R; 0), and Z^T = H_1 .. H_m (0; I). Whatever the rank of J, Z's rows are orthonormal.
+    """
+    m, n = J.shape
+    U, beta = J.copy(), np.zeros(m)
+    for i in range(m):
+        rest = 0.0
+        for k in range(i + 1, n):
+            rest += U[i, k] * U[i, k]
+        if rest == 0.0:
+            continue
+        end = -math.copysign(math.sqrt(U[i, i] * U[i, i] + rest), U[i, i])
+        beta[i] = (end - U[i, i]) / end
+        scale = 1.0 / (U[i, i] - end)
+        for k in range(i + 1, n):
+            U[i, k] *= scale
+        U[i, i] = 1.0
+        for j in range(i + 1, m):
+            _reflect(U, beta[i], i, U, j)
+    for k in range(n - m):
+        for j in range(n):
+            Z[k, j] = 1.0 if j == m + k else 0.0
+        for i in range(m - 1, -1, -1):
+            _reflect(U, beta[i], i, Z, k)
+
+
+@compiled
+def _reflect(U: Array, beta: float, i: int, X: Array, row: int) -> None:
+    """The row of X becomes (I - beta u u^T) times it, with u the row i of U from its diagonal on."""
+    s = 0.0
+    for k in range(i, X.shape[1]):
+        s += U[i, k] * X[row, k]
+    s *= beta
+    for k in range(i, X.shape[1]):
+        X[row, k] -= s * U[i, k]
+
+
+@compiled
+def diagonalise(A: Array, V: Array) -> None:
+    """A (n, n), symmetric, becomes V^T A V, diagonal, with the eigenvectors as V's columns: Jacobi."""
+    n = A.shape[0]
+    for i in range(n):
+        for j in range(n):
+            V[i, j] = 1.0 if i == j else 0.0
+    for _ in range(_SWEEPS):
+        off = whole = 0.0
+        for i in range(n):
+            whole += A[i, i] * A[i, i]
+            for j in range(i):
+                off += A[i, j] * A[i, j]
+        if not off > 1e-32 * whole:
+            return
+        for p in range(n):
+            for q in range(p + 1, n):
+                _rotate(A, V, p, q)
+
+
+@compiled
+def _rotate(A: Array, V: Array, p: int, q: int) -> None:
+    """Jacobi's rotation that makes A[p, q] zero."""
+    if A[p, q] == 0.0:
+        return
+    ratio = 0.5 * (A[q, q] - A[p, p]) / A[p, q]
+    t = math.copysign(1.0, ratio) / (abs(ratio) + math.sqrt(ratio * ratio + 1.0))
+    c = 1.0 / math.sqrt(t * t + 1.0)
+    s = t * c
+    for k in range(A.shape[0]):
+        A[k, p], A[k, q] = c * A[k, p] - s * A[k, q], s * A[k, p] + c * A[k, q]
+    for k in range(A.shape[0]):
+        A[p, k], A[q, k] = c * A[p, k] - s * A[q, k], s * A[p, k] + c * A[q, k]
+        V[k, p], V[k, q] = c * V[k, p] - s * V[k, q], s * V[k, p] + c * V[k, q]

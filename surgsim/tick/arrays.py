@@ -97,7 +97,13 @@ class Numbers(Record):
 
 
 def point(where: Any, array: Array) -> None:
-    """Fill in where `array`, contiguous, is; `where` is a record of `Numbers`."""
+    """Fill in where `array` is; `where` is a record of `Numbers`.
+
+    Raises:
+        SurgsimError: If the array is not of doubles that lie side by side.
+    """
+    if array.dtype != np.float64 or not array.flags.c_contiguous:
+        raise SurgsimError(f"a kernel's numbers are a contiguous array of float64, not of {array.dtype}")
     where.address, where.length = array.ctypes.data, array.size
 
 

@@ -40,20 +40,32 @@ _matrix_on_stack = _on_stack(_MATRIX)
 
 
 def scratch(size: int) -> Array:
-    """An array (size,) of any content, at most 40 entries."""
-    assert size <= _VECTOR
+    """An array (size,) of any content.
+
+    Raises:
+        ValueError: If it is larger than 40 entries.
+    """
+    if size > _VECTOR:
+        raise ValueError("a scratch vector has at most 40 entries")
     return np.empty(size)
 
 
 def scratch_matrix(rows: int, columns: int) -> Array:
-    """An array (rows, columns) of any content, as large as a square of one more than the most joints."""
-    assert rows * columns <= _MATRIX
+    """An array (rows, columns) of any content.
+
+    Raises:
+        ValueError: If it is larger than 9 rows of 9.
+    """
+    if rows * columns > _MATRIX:
+        raise ValueError("a scratch matrix has at most 81 entries")
     return np.empty((rows, columns))
 
 
 @overload(scratch, inline="always")
 def _scratch(size: Any) -> Any:
     def view(size: Any) -> Any:
+        if size > _VECTOR:
+            raise ValueError("a scratch vector has at most 40 entries")
         return carray(_vector_on_stack(), (size,), np.float64)
 
     return view
@@ -62,6 +74,8 @@ def _scratch(size: Any) -> Any:
 @overload(scratch_matrix, inline="always")
 def _scratch_matrix(rows: Any, columns: Any) -> Any:
     def view(rows: Any, columns: Any) -> Any:
+        if rows * columns > _MATRIX:
+            raise ValueError("a scratch matrix has at most 81 entries")
         return carray(_matrix_on_stack(), (rows, columns), np.float64)
 
     return view

@@ -17,6 +17,7 @@ SHORT = ("task.duration_s=1", "task.ramp_s=0.2", "task.hold_start_s=0.1", "task.
 LONG = ("task.duration_s=5", "task.ramp_s=0.2", "task.hold_start_s=0.1", "task.hold_end_s=0.1")
 DRAWN = ("disturbances=[{type: sensor_noise}, {type: actuation_delay, delay_s: 0.001, jitter_s: 0.001}]",)
 CONTROLLERS = ("pinv", "gradient", "rnn", "vprnn", "qp", "passive_convex", "rcm_inverse_dynamics", "mink")
+CONTROLLERS += ("self_motion",)
 
 
 def _begun(scenario, ticks):

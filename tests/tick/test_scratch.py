@@ -63,8 +63,14 @@ def test_functions_with_scratch_are_found():
     assert {"hierarchical_impedance", "nearest", "vprnn"} <= {function.name for _, function in FUNCTIONS}
 
 
-def test_more_than_there_is_room_for_is_seen_in_the_python_form():
-    with pytest.raises(AssertionError):
-        scratch(1000)
-    with pytest.raises(AssertionError):
-        scratch_matrix(10, 10)
+@compiled
+def _first(size, rows):
+    return scratch(size).size + scratch_matrix(rows, 9).size
+
+
+@pytest.mark.parametrize("size", [(41, 1), (1, 10)])
+def test_more_than_there_is_room_for_is_refused(size):
+    for form in (_first, _first.py_func):
+        with pytest.raises(ValueError, match="at most"):
+            form(*size)
+    assert _first(40, 9) == 121

@@ -74,10 +74,10 @@ class KernelResolver:
             ControlFailure: If the kernel has no answer.
         """
         seen = self.seen(problem)
-        seen.first = memory is None
+        seen["first"] = memory is None
         after = np.zeros(self.memory_size) if memory is None else memory.copy()
-        out = new(Resolved, seen.q.size)
-        out.p_WTd[:], out.v_WTd[:], out.a_WTd[:] = seen.p_WTd, seen.v_WTd, seen.a_WTd
+        out, told = new(Resolved, problem.q.size), problem.command
+        out["p_WTd"], out["v_WTd"], out["a_WTd"] = told.p_WTd, told.v_WTd, told.a_WTd
         status = self.kernel(self.gains, seen, after, out)
         if status != GOES_ON:
             raise self.failure(status, seen, after)
@@ -97,14 +97,14 @@ class KernelResolver:
 
     def _resolution(self, problem: VelocityProblem, out: Any) -> Resolution:
         told, width = problem.command, sum(len(block.columns) for block in self.columns)
-        p, v, a = out.p_WTd.copy(), out.v_WTd.copy(), out.a_WTd.copy()
-        same = (p == told.p_WTd).all() and (v == told.v_WTd).all() and (a == told.a_WTd).all()
+        p, v, a = out["p_WTd"].copy(), out["v_WTd"].copy(), out["a_WTd"].copy()
         command = None
+        same = (p == told.p_WTd).all() and (v == told.v_WTd).all() and (a == told.a_WTd).all()
         if not same:
             command = TipCommand(p_WTd=p, v_WTd=v, a_WTd=a, roll_rate=told.roll_rate, jaw=told.jaw)
         return Resolution(
-            qdot=out.qdot.copy(),
-            residual=float(out.residual),
+            qdot=out["qdot"].copy(),
+            residual=float(out["residual"]),
             command=command,
-            values=out.values[:width].copy(),
+            values=out["values"][:width].copy(),
         )

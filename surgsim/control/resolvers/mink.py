@@ -58,6 +58,8 @@ class Mink:
         speeds = dict(zip(names, arm.limits.velocity.tolist(), strict=True))
         self._model = model
         self._velocity_limit = mink.VelocityLimit(model, speeds)
+        self._limits: tuple[mink.Limit, ...] = ()
+        self._limits_dt_s = 0.0
 
     def start(self, problem: VelocityProblem) -> None:
         """The resolver has no state."""
@@ -68,10 +70,6 @@ class Mink:
         dt, configuration = problem.dt_s, self._configuration
         configuration.update(problem.q)
         self._tip.set_target(mink.SE3.from_translation(problem.kin.p_WT + dt * v[:3]))
-        limits = [
-            self._velocity_limit,
-            mink.ConfigurationLimit(self._model, gain=min(1.0, self._c.position_gain_per_s * dt)),
-        ]
         try:
             qdot = mink.solve_ik(
                 configuration,
@@ -79,7 +77,7 @@ class Mink:
                 dt,
                 "daqp",
                 self._c.damping,
-                limits=limits,
+                limits=self._limits_for(dt),
                 constraints=self._hard_rows(problem, v),
             )
         except mink.NoSolutionFound as error:
@@ -87,6 +85,14 @@ class Mink:
                 Outcome.INFEASIBLE, "mink found no velocity that meets RCM and limits", {"J": J, "v": v}
             ) from error
         return bounded_resolution(problem, np.asarray(qdot), J, v), None
+
+    def _limits_for(self, dt_s: float) -> tuple[mink.Limit, ...]:
+        """Limits for a control period, as mink wants them; making them takes as long as its solver."""
+        if dt_s != self._limits_dt_s:
+            gain = min(1.0, self._c.position_gain_per_s * dt_s)
+            self._limits = (self._velocity_limit, mink.ConfigurationLimit(self._model, gain=gain))
+            self._limits_dt_s = dt_s
+        return self._limits
 
     def _hard_rows(self, problem: VelocityProblem, v: Array) -> list[RcmTask] | None:
         """The RCM rows, aimed so that J_rcm dq = T v_rcm."""

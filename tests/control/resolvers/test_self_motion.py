@@ -95,6 +95,14 @@ def test_what_omega_cannot_meet_is_an_outcome(arm, velocity_problem):
     assert sorted(failure.value.data) == ["J", "lower", "rhs", "upper"]
 
 
+def test_a_stretched_arm_is_an_outcome(arm, velocity_problem):
+    p = velocity_problem(0, q=np.zeros(7), rcm_error_m=0.0, trocar_speed=0.0)
+    resolver = SelfMotionConfig(search_starts=0).build(arm)
+    with pytest.raises(ControlFailure, match="the task Jacobian has lost rank") as failure:
+        resolver.step(p, resolver.start(p))
+    assert failure.value.outcome is Outcome.INFEASIBLE
+
+
 def test_at_rest_at_the_optimum_nothing_moves(arm, velocity_problem, far):
     manifold = SelfMotion(arm)
     top = manifold.climb(HOME, P_WT, P_WC)
