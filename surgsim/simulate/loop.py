@@ -179,6 +179,7 @@ class Simulation:
     def _advance_by(self, ticks: int) -> None:
         plant, controller = self._setup.plant, self._setup.controller
         plant.refill()
+        self._task.refill(ticks)
         self._run_ticks(
             ticks,
             self._run,
@@ -306,7 +307,7 @@ class Simulation:
 
     def _arrays(self) -> dict[str, Array]:
         setup = self._setup
-        return {**self._task.arrays, **setup.controller.arrays, **setup.plant.hooks.state}
+        return {"task_memory": self._task.memory, **setup.controller.arrays, **setup.plant.hooks.state}
 
     def _objects(self) -> dict[str, Any]:
         setup = self._setup
@@ -321,6 +322,7 @@ class Simulation:
             **records,
             **memory,
             **self._arrays(),
+            "task_gains": self._task.gains,
             "plant": setup.plant,
             "controller": setup.controller,
             "scene": setup.scene,

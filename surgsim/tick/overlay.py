@@ -1,0 +1,39 @@
+"""Records laid over the flat arrays of numbers and memory that a kernel is given.
+
+A law whose numbers are many reads them by name: its kernel views the beginning of `gains` as one record and
+that of `memory` as another. Every field takes whole doubles, so that the record ends where tables of other
+lengths begin.
+
+    LAW, LAW_SIZE = overlay(Law)
+
+    law = gains[:LAW_SIZE].view(LAW)[0]        # in a kernel and in Python
+"""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from surgsim.tick.arrays import Record, layout
+
+Array = NDArray[np.float64]
+
+
+def overlay(kind: type[Record]) -> tuple[Any, int]:
+    """The type of a record, and how many doubles it takes."""
+    hashed: Any = kind
+    dtype = np.dtype((np.record, layout(hashed, 0)))
+    return dtype, dtype.itemsize // 8
+
+
+def laid_over(kind: type[Record], array: Array) -> Any:
+    """The record at the beginning of `array`, not copied."""
+    dtype, size = overlay(kind)
+    return array[:size].view(dtype)[0]
+
+
+def take(record: Any, config: Any) -> None:
+    """Fill the numbers of a record that a config has by the same name."""
+    for name in record.dtype.names:
+        if record.dtype[name] == np.float64 and hasattr(config, name):
+            record[name] = getattr(config, name)
