@@ -153,7 +153,6 @@ class HookTable:
             values=np.zeros(int(ends[-1, 2])),
         )
         self._first_address = int(ends[-1, 0])
-        self._own_gains = self.arrays.gains[: self._first_address]
         self._addresses = addresses
         functions: list[Any] = []
         for slot, hook in enumerate(hooks):
@@ -196,13 +195,8 @@ class HookTable:
 
     @property
     def state(self) -> dict[str, Array]:
-        """The parts' numbers, memories and columns, without addresses."""
-        a = self.arrays
-        return {
-            "hook_gains": a.gains[: self._first_address],
-            "hook_memory": a.memory,
-            "hook_values": a.values,
-        }
+        """The parts' memories and columns; their numbers follow from the scenario, or are addresses."""
+        return {"hook_memory": self.arrays.memory, "hook_values": self.arrays.values}
 
     def values_of(self, part: int) -> Array:
         """The columns of a part, a view of the plant's values."""
