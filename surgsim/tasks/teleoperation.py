@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from pydantic import NonNegativeFloat, PositiveFloat, model_validator
 
 from surgsim.catalog import PartConfig
+from surgsim.columns import width
 from surgsim.compiled import as_parameter
 from surgsim.models.config import Vec3
 from surgsim.models.peg_board import PegBoardLayout
@@ -234,6 +235,9 @@ class Teleoperation:
         state, at = laid_over(State, self.memory), self._places
         tremor, scatter, forth, back = self._random
         operator = state.operator.operator
+        used = (state.forth.drawn, state.back.drawn, operator.shaken, operator.scattered)
+        if DRAWN - max(used) >= ticks:
+            return
 
         def packets(channel: Any, config: ChannelConfig, random: np.random.Generator) -> _Draw:
             return lambda rows: draw_packets(config, channel, random, rows)
@@ -244,11 +248,11 @@ class Teleoperation:
         def misses(rows: Array) -> None:
             rows[:] = scatter.standard_normal(rows.shape)
 
-        def top_up(begin: int, width: int, used: int, draw: _Draw) -> int:
+        def top_up(begin: int, size: int, used: int, draw: _Draw) -> int:
             left = DRAWN - used
             if left >= ticks:
                 return used
-            rows = self.memory[begin : begin + DRAWN * width].reshape(-1, width)
+            rows = self.memory[begin : begin + DRAWN * size].reshape(-1, size)
             rows[:left] = rows[used:].copy()
             draw(rows[left:])
             return 0
@@ -278,6 +282,9 @@ class Teleoperation:
         told.t_s, told.p_WT[:] = t_s, self._start if feedback is None else feedback.p_WT
         told.f_T[:] = 0.0 if feedback is None else feedback.f_T
         self.refill(1)
+        if self._hand is None:
+            kernel(self.gains, told, self.memory, self._out)
+            return command_of(self._out)
         before, entered = laid_over(Law, self.gains).operator.entry.copy(), PythonPart(self.act)
         self.enter(entered.gains)
         status = kernel(self.gains, told, self.memory, self._out)
@@ -294,7 +301,7 @@ class Teleoperation:
 
     def values(self) -> Array:
         """Values of `columns` at the last `command`."""
-        values: Array = self._out.values[: sum(len(block.columns) for block in COLUMNS)].copy()
+        values: Array = self._out.values[: width(COLUMNS)].copy()
         return values
 
     def finished(self, t_s: float) -> bool:

@@ -9,24 +9,25 @@ lengths begin.
     law = gains[:LAW_SIZE].view(LAW)[0]        # in a kernel and in Python
 """
 
+from functools import cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from surgsim.tick.arrays import Record, layout
+from surgsim.tick.arrays import layout
 
 Array = NDArray[np.float64]
 
 
-def overlay(kind: type[Record]) -> tuple[Any, int]:
-    """The type of a record, and how many doubles it takes."""
-    hashed: Any = kind
-    dtype = np.dtype((np.record, layout(hashed, 0)))
+@cache
+def overlay(kind: Any) -> tuple[Any, int]:
+    """The type of a record of the class `kind`, and how many doubles it takes."""
+    dtype = np.dtype((np.record, layout(kind, 0)))
     return dtype, dtype.itemsize // 8
 
 
-def laid_over(kind: type[Record], array: Array) -> Any:
+def laid_over(kind: Any, array: Array) -> Any:
     """The record at the beginning of `array`, not copied."""
     dtype, size = overlay(kind)
     return array[:size].view(dtype)[0]
