@@ -219,8 +219,8 @@ class Teleoperation:
         near, far = state.operator, state.remote
         self._console.reset(law.operator.console, near.console)
         align(law.operator.operator.mapping, c.mapping, near.console.state.position, self._start)
-        law.ends = bool(self._goals) or self._hand is not None
-        law.operator.in_python = self._hand is not None
+        state.ends = bool(self._goals) or self._hand is not None
+        near.in_python = self._hand is not None
         near.scale = 1.0
         for side_law, side in ((law.operator, near), (law.remote, far)):
             fill_tank(side_law.tank, side.tank)
@@ -307,7 +307,7 @@ class Teleoperation:
     def finished(self, t_s: float) -> bool:
         """Whether the operator has been done for `hold_end_s`; a simulated one without goals holds on."""
         law, state = laid_over(Law, self.gains), laid_over(State, self.memory)
-        return bool(law.ends and state.is_done and t_s >= state.done_s + law.hold_end_s)
+        return bool(state.ends and state.is_done and t_s >= state.done_s + law.hold_end_s)
 
 
 _Draw = Callable[[Array], None]

@@ -50,7 +50,6 @@ class OperatorSideLaw(Record):
 
     Attributes:
         passivity: TANK, TDPA or OFF.
-        in_python: Whether the hand is a Python part.
         period_s: Control period [s].
         stiffness_n_per_m: K_v of the force law, per metre of handle motion.
         refill_damping_ns_per_mj: Damper on the handle per joule that its tank lacks.
@@ -65,7 +64,6 @@ class OperatorSideLaw(Record):
 
     SHAPES: ClassVar[dict[str, str]] = {"entry": "1", "start_tip": "3"}
     passivity: int
-    in_python: int
     period_s: float
     stiffness_n_per_m: float
     refill_damping_ns_per_mj: float
@@ -82,6 +80,7 @@ class OperatorSide(Record):
     """State of the operator's side.
 
     Attributes:
+        in_python: Whether the hand is a Python part.
         t_s: Time [s].
         scale: Share of the force that the tank can pay for.
         tip: The tip as it is known (3,) [m].
@@ -102,6 +101,7 @@ class OperatorSide(Record):
         "content": str(CONTENT),
         **{name: "3" for name in ("tip", "desired", "path")},
     }
+    in_python: int
     t_s: float
     scale: float
     tip: Array
@@ -210,7 +210,7 @@ def step_operator_side(
     received = receive_at_operator(law, side, line, channel, memory)
     make_passive(law, side)
     status = GOES_ON
-    if law.in_python:
+    if side.in_python:
         status = enter(law.entry)
     else:
         operate(law.operator, gains, side.operator, memory, side.t_s, side.tip, side.console.state, side.hand)

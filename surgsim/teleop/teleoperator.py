@@ -53,7 +53,6 @@ class Law(Record):
 
     Attributes:
         hold_end_s: Time at rest after the operator is done [s].
-        ends: Whether it ends when the operator is done.
         start: The tip's place at first (3,) [m].
         operator: The operator's side.
         remote: The remote side.
@@ -63,7 +62,6 @@ class Law(Record):
 
     SHAPES: ClassVar[dict[str, str]] = {"start": "3"}
     hold_end_s: float
-    ends: int
     start: Array
     operator: OperatorSideLaw
     remote: RemoteSideLaw
@@ -75,6 +73,7 @@ class State(Record):
     """All that a teleoperation remembers but tables and the console's own model.
 
     Attributes:
+        ends: Whether it ends when the operator is done.
         is_done: Whether the operator is done.
         done_s: Since when [s].
         velocity: v_d of the last period (3,) [m/s].
@@ -87,6 +86,7 @@ class State(Record):
     """
 
     SHAPES: ClassVar[dict[str, str]] = {"velocity": "3", "content": str(CONTENT)}
+    ends: int
     is_done: int
     done_s: float
     velocity: Array
@@ -169,7 +169,7 @@ def teleoperate(gains: Array, feedback: Feedback, memory: Array, out: Command) -
     send(law.back, state.back, memory, t_s, state.content, energy)
     if operator.hand.done and not state.is_done:
         state.is_done, state.done_s = 1, t_s
-    over = law.ends and state.is_done and t_s >= state.done_s + law.hold_end_s
+    over = state.ends and state.is_done and t_s >= state.done_s + law.hold_end_s
     out.finished = 1 if over else 0
     _tell(law, state, feedback, out)
     _record(law, state, t_s, out.values)

@@ -135,6 +135,32 @@ def test_signals_are_named_once_and_complete(teleoperate, goal):
     assert all(np.isfinite(run[name]).all() for name in set(names) - {"setpoint_age_s"})
 
 
+class Drawing:
+    """Pulls in circles, and remembers how often it was asked."""
+
+    asked = 0
+
+    def step(self, t_s, seen_tip, handle):
+        self.asked += 1
+        wrench = np.zeros(6)
+        wrench[:2] = 0.5 * np.cos(0.02 * self.asked), 0.5 * np.sin(0.02 * self.asked)
+        return HandCommand(wrench=wrench, jaw=0.5, goal=0, done=False, missed=0)
+
+
+def test_a_fork_keeps_the_hand_in_python():
+    setup = prepare(load_scenario("teleop_free_motion_panda"))
+    setup.task.hold(Drawing())
+    simulation = Simulation(setup)
+    simulation.advance(60)
+    fork = simulation.fork()
+    for one in (simulation, fork):
+        one.advance(200)
+    a, b = (one.trace() for one in (simulation, fork))
+    kept = [k for k, name in enumerate(a.columns) if name != "control_time_s"]
+    np.testing.assert_array_equal(a.data[:, kept], b.data[:, kept])
+    assert np.ptp(a["handle_x_m"]) > 1e-4
+
+
 class Failing:
     def step(self, t_s, seen_tip, handle):
         if t_s > 0.0105:
