@@ -12,7 +12,7 @@ from surgsim.models.build import Scene
 from surgsim.plant.truth import Contact
 from surgsim.tick.arrays import Record, World, new
 from surgsim.tick.scratch import scratch
-from surgsim.tick.views import doubles, integers, vector
+from surgsim.tick.views import doubles, vector, words
 
 Array = NDArray[np.float64]
 
@@ -179,7 +179,7 @@ def is_clear(watch: Watch, world: World) -> bool:
 @compiled
 def _place(watch: Watch, i: int, ends: Array) -> None:
     """End points of a capsule, world frame."""
-    body = integers(watch.bodies, watch.count)[i]
+    body = words(watch.bodies, watch.count)[i]
     p, R = doubles(watch.xpos, watch.nbody, 3)[body], doubles(watch.xmat, watch.nbody, 9)[body]
     local = doubles(watch.local, 2 * watch.count, 3)
     for k in range(2 * i, 2 * i + 2):
@@ -207,7 +207,7 @@ def forbidden_contact(watch: Watch, p_WC: Array) -> tuple[int, int, float, float
     The last number is the room that is left [m], 0 where something touches.
     """
     ends, radii = doubles(watch.ends, 2 * watch.count, 3), vector(watch.radii, watch.count)
-    pairs, shaft, patient = integers(watch.pairs, 2 * watch.pair_count), watch.shaft, watch.patient
+    pairs, shaft, patient = words(watch.pairs, 2 * watch.pair_count), watch.shaft, watch.patient
     room = math.inf
     for i in range(watch.count):
         _place(watch, i, ends)
@@ -288,7 +288,7 @@ def body_gap(p0: Array, p1: Array, radius: float, semi_axes: Array) -> float:
 
 @compiled
 def table_gap(p0: Array, p1: Array, radius: float, centre: Array, half: Array) -> float:
-    """A lower bound of the distance [m] of a capsule from the box but for 0.02 mm; minus the radius inside."""
+    """A lower bound, but for 0.02 mm, of the distance [m] of a capsule from the box; -radius inside."""
     length = 0.0
     for j in range(3):
         length += (p1[j] - p0[j]) ** 2

@@ -18,7 +18,7 @@ from surgsim.models.build import Scene
 from surgsim.plant.bore import Bore, act, drag, wall_force
 from surgsim.plant.bystanders import joint_columns
 from surgsim.plant.contacts import ContactWatch
-from surgsim.plant.ledger import EnergyLedger
+from surgsim.plant.ledger import EnergyLedger, after_step, before_step, fill_terms
 from surgsim.plant.part import BLOCK_TICKS, PlantPart
 from surgsim.plant.port import Port
 from surgsim.plant.records import world_of
@@ -51,6 +51,7 @@ from surgsim.tick.views import doubles, site_place, vector
 Array = NDArray[np.float64]
 _FIRST_PART = 2
 """Own columns and the ledger stand before the parts."""
+_TERMS = len(EnergyLedger.COLUMNS)
 
 
 class DynamicPlantConfig(PartConfig):
@@ -259,8 +260,7 @@ class DynamicPlant:
     @property
     def objects(self) -> dict[str, Any]:
         """What of the plant is a Python object with a state, by name."""
-        parts = {f"{type(part).__name__} ({k})": part for k, part in enumerate(self._parts)}
-        return {**parts, "energy ledger": self._ledger}
+        return {f"{type(part).__name__} ({k})": part for k, part in enumerate(self._parts)}
 
     @property
     def arrays(self) -> dict[str, Any]:
@@ -301,16 +301,14 @@ class DynamicPlant:
     def _hooks(self, places: NDArray[np.intp]) -> HookTable:
         """Own columns, the ledger and all parts, in this order."""
         own = 3 * (self._scene.wall is not None) + 3 * self._touched + len(places)
-        columns = PlantPart()
+        ledger, columns = self._ledger, PlantPart()
         columns.gains = places.astype(float)
-        shares = [(columns, own), (PlantPart(), 0 if self._ledger is None else len(EnergyLedger.COLUMNS))]
+        shares: list[tuple[Any, int]] = [(columns, own)]
+        shares.append((PlantPart(), 0) if ledger is None else (ledger, len(EnergyLedger.COLUMNS)))
         hooks = [Hook(kind=VALUES, part=0, rank=0, kernel=_own_values)]
-        if self._ledger is not None:
-            hooks += [
-                Hook(kind=BEFORE_STEP, part=1, rank=0, call=self._ledger.before_step),
-                Hook(kind=AFTER_STEP, part=1, rank=0, call=self._ledger.after_step),
-                Hook(kind=VALUES, part=1, rank=0, call=lambda: self._record(1, self._ledger_terms())),
-            ]
+        if ledger is not None:
+            kernels = {BEFORE_STEP: before_step, AFTER_STEP: after_step, VALUES: fill_terms}
+            hooks += [Hook(kind=kind, part=1, rank=0, kernel=kernel) for kind, kernel in kernels.items()]
         for number, part in enumerate(self._parts, _FIRST_PART):
             width = sum(len(block.columns) for block in part.columns) if _records(part) else 0
             shares.append((part, width))
@@ -329,13 +327,6 @@ class DynamicPlant:
                 found.append(Hook(kind=kind, part=number, rank=part.rank, kernel=kernel, call=call))
         return found
 
-    def _ledger_terms(self) -> Array:
-        assert self._ledger is not None
-        return self._ledger.terms()
-
-    def _record(self, part: int, values: Array) -> None:
-        self._own_slice(part)[:] = values
-
     def _own_slice(self, part: int) -> Array:
         """The columns of a part in the plant's values."""
         return self._table.values_of(part)
@@ -351,8 +342,6 @@ class DynamicPlant:
         self._drawn_at[:] = -1.0
         self.refill()
         self._port.reset()
-        if self._ledger is not None:
-            self._ledger.start()
         self._told(self._begin(world, self.bore, self._table.record))
         return self.state()
 

@@ -21,7 +21,7 @@ from surgsim.plant.state import State
 from surgsim.tick.arrays import Numbers, Record, World, hook_signature, new, point, type_of
 from surgsim.tick.python_part import PythonPart, python_kernel
 from surgsim.tick.status import GOES_ON
-from surgsim.tick.views import integers, vector
+from surgsim.tick.views import vector, words
 
 Array = NDArray[np.float64]
 
@@ -57,8 +57,8 @@ def advance_signature(n: int) -> Any:
 @compiled
 def call_hooks(kind: int, hooks: Hooks, world: World) -> int:
     """Call all hooks of a kind; the first status that does not go on."""
-    for i in range(integers(hooks.counts + 8 * kind, 1)[0]):
-        at = integers(hooks.table + 8 * _ENTRY * (SLOTS * kind + i), _ENTRY)
+    for i in range(words(hooks.counts + 8 * kind, 1)[0]):
+        at = words(hooks.table + 8 * _ENTRY * (SLOTS * kind + i), _ENTRY)
         gains, memory, out = vector(at[1], at[2]), vector(at[3], at[4]), vector(at[5], at[6])
         status: int = call_at(at[0], gains, world, memory, out)
         if status != GOES_ON:
@@ -179,8 +179,8 @@ class HookTable:
 
     @property
     def state(self) -> dict[str, Array]:
-        """The parts' numbers, memories and columns."""
-        return {"hook_gains": self._gains, "hook_memory": self._memory, "hook_values": self.values}
+        """The parts' memories and columns; their numbers follow from the scenario, or are addresses."""
+        return {"hook_memory": self._memory, "hook_values": self.values}
 
     def values_of(self, part: int) -> Array:
         """The columns of a part, a view of the plant's values."""

@@ -195,6 +195,7 @@ class Simulation:
 
     def _advance_by(self, ticks: int) -> None:
         self._setup.plant.refill()
+        self._task.refill(ticks)
         self._run_ticks(ticks, *self.arguments)
         if self._run.progress.reason != GOING:
             self._ending = self._end(int(self._run.progress.reason))
@@ -312,7 +313,7 @@ class Simulation:
 
     def _arrays(self) -> dict[str, Array]:
         setup = self._setup
-        return {**self._task.arrays, **setup.controller.arrays, **setup.plant.arrays}
+        return {"task_memory": self._task.memory, **setup.controller.arrays, **setup.plant.arrays}
 
     def _objects(self) -> dict[str, Any]:
         setup = self._setup
@@ -327,6 +328,7 @@ class Simulation:
             **records,
             **memory,
             **self._arrays(),
+            "task_gains": self._task.gains,
             "plant": setup.plant,
             "controller": setup.controller,
             "scene": setup.scene,

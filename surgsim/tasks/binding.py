@@ -38,15 +38,21 @@ class BoundTask:
         if isinstance(kernel, Dispatcher):
             self.kernel: int = address_of(kernel, task_signature())
             self.gains: Array = task.gains  # type: ignore[attr-defined]
+            self._enter_within(task)
         else:
             self._entered = PythonPart(self._call)
             self.kernel, self.gains = address_of(python_kernel, task_signature()), self._entered.gains
 
-    @property
-    def arrays(self) -> dict[str, Array]:
-        """Its numbers and memory, without addresses."""
-        own = {"task_memory": self.memory}
-        return own if self._entered is not None else {**own, "task_gains": self.gains}
+    def _enter_within(self, task: Any) -> None:
+        """Let a kernel that has a Python part within it enter that."""
+        if hasattr(task, "enter"):
+            self._entered = PythonPart(task.act)
+            task.enter(self._entered.gains)
+
+    def refill(self, ticks: int) -> None:
+        """Let it draw ahead what the next `ticks` ticks need."""
+        if hasattr(self._task, "refill"):
+            self._task.refill(ticks)
 
     def raised(self) -> BaseException | None:
         """What a task in Python raised."""

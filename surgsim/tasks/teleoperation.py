@@ -1,6 +1,7 @@
 """Teleoperation: the tip follows a master console through a delayed channel."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import cached_property
 from typing import Any, Literal, Self
 
 import numpy as np
@@ -8,10 +9,12 @@ from numpy.typing import NDArray
 from pydantic import NonNegativeFloat, PositiveFloat, model_validator
 
 from surgsim.catalog import PartConfig
-from surgsim.columns import scalar, vector
+from surgsim.columns import width
+from surgsim.compiled import as_parameter
 from surgsim.models.config import Vec3
 from surgsim.models.peg_board import PegBoardLayout
-from surgsim.tasks.base import EnergyBudget, Feedback, TipCommand
+from surgsim.tasks.base import Feedback, TipCommand
+from surgsim.tasks.command import command_of
 from surgsim.tasks.success import RunColumns, Success
 from surgsim.tasks.teleoperation_program import (
     GoalConfig,
@@ -20,26 +23,32 @@ from surgsim.tasks.teleoperation_program import (
     rings_success,
     way_points,
 )
-from surgsim.teleop.account import ACCOUNT_COLUMNS, account
-from surgsim.teleop.channel import Channel, ChannelConfig
-from surgsim.teleop.console import ConsoleConfig
-from surgsim.teleop.mapping import MappingConfig
-from surgsim.teleop.messages import OperatorMessage, PassivityMode, RemoteMessage
-from surgsim.teleop.operator import Goal, Hand, OperatorConfig
-from surgsim.teleop.operator_side import OPERATOR_COLUMNS, OperatorOutput, OperatorSide, OperatorSideConfig
+from surgsim.teleop.channel import DRAW, ChannelConfig, draw_packets
+from surgsim.teleop.console import Console, ConsoleConfig
+from surgsim.teleop.mapping import MappingConfig, align
+from surgsim.teleop.messages import MODES, PassivityMode
+from surgsim.teleop.operator import Goal, Hand, OperatorConfig, describe_operator, fill_action, goal_rows
 from surgsim.teleop.passivity_control import PassivityControlConfig
-from surgsim.teleop.receiver import ReceiverConfig
-from surgsim.teleop.remote_side import (
-    REMOTE_COLUMNS,
-    RemoteMeasurement,
-    RemoteOutput,
-    RemoteSide,
-    RemoteSideConfig,
+from surgsim.teleop.receiver import ReceiverConfig, expect
+from surgsim.teleop.tank import TankConfig, fill_tank
+from surgsim.teleop.teleoperator import (
+    COLUMNS,
+    DRAWN,
+    LAW_SIZE,
+    Law,
+    State,
+    copies,
+    places,
+    teleoperate,
 )
-from surgsim.teleop.tank import TankConfig
-from surgsim.teleop.tip_work import TipWork
+from surgsim.tick.arrays import task_signature
+from surgsim.tick.blank import new_command, new_feedback
+from surgsim.tick.overlay import laid_over, take
+from surgsim.tick.python_part import PythonPart
+from surgsim.tick.status import GOES_ON
 
 Array = NDArray[np.float64]
+_MOST_PERIODS = 4_000_000
 
 
 class TeleoperationConfig(PartConfig):
@@ -55,7 +64,7 @@ class TeleoperationConfig(PartConfig):
         hold_end_s: Time at rest after the last goal [s].
         passivity: Energy tanks, the time-domain passivity controller, or nothing.
         stiffness_n_per_m: K_v of the force law, per metre of handle motion [N/m].
-        refill_damping_ns_per_mj: Damper on the handle per joule that its tank lacks.
+        refill_damping_ns_per_mj: Damper on the handle per joule that its tank lacks; 0: none.
         drift_gain_per_s: Pull of the tip to the master's position beside its velocity; 0: none [1/s].
         drift_speed_m_per_s: Limit of that pull [m/s].
         operator: Eyes, decisions and hand.
@@ -131,59 +140,34 @@ class TeleoperationConfig(PartConfig):
             return rings_success(run)
         return goals_success(run, len(self.goals))
 
-    def operator_side(self) -> OperatorSideConfig:
-        """What the operator's side consists of."""
-        return OperatorSideConfig(
-            stiffness_n_per_m=self.stiffness_n_per_m,
-            refill_damping_ns_per_mj=self.refill_damping_ns_per_mj,
-            passivity=self.passivity,
-            mapping=self.mapping,
-            console=self.console,
-            operator=self.operator,
-            receiver=self.receiver,
-            tank=self.tanks,
-            control=self.passivity_control,
-        )
-
-    def remote_side(self) -> RemoteSideConfig:
-        """What the remote side consists of, but for the arm."""
-        return RemoteSideConfig(
-            drift_gain_per_s=self.drift_gain_per_s,
-            drift_speed_m_per_s=self.drift_speed_m_per_s,
-            passivity=self.passivity,
-            receiver=self.receiver,
-            tank=self.tanks,
-            control=self.passivity_control,
-        )
-
 
 class Teleoperation:
-    """One tick of both sides and of the channels between them; the arm is the controller's.
+    """Both sides and the channels between them: `teleoperate`; the arm is the controller's.
 
-        x_o, v_o, jaw ── channel ──▶ v_d = trust (v + k (x - p_WT)),  budget T - epsilon ──▶ controller
-        hand ◀── K_v (p_WT(t - delta) - x_o) ◀── channel ── p_WT, force, energy ◀── arm
-
-    The command's position, to which `tip_error` refers, is the master's as received: the place that the
-    operator pointed to one channel's delay ago. The arm is asked for the velocity alone, so the error holds
-    what the slack, the walls, the budget and lost packets have left out.
+    Attributes:
+        kernel: status = kernel(gains, feedback, memory, out).
+        gains: Its numbers: a `Law`, then the goals' rows.
+        memory: Its memory: a `State`, then the tables of `places`.
     """
 
     reacts = True
-    columns = (
-        *OPERATOR_COLUMNS,
-        *REMOTE_COLUMNS,
-        *ACCOUNT_COLUMNS,
-        vector("velocity_issued", "m_per_s"),
-        scalar("setpoint_age", "s"),
-    )
+    columns = COLUMNS
+    kernel = staticmethod(teleoperate)
 
     def __init__(
         self, config: TeleoperationConfig, start: Array, period_s: float, seed: np.random.SeedSequence
     ) -> None:
-        self._c, self._start, self._period = config, start, period_s
-        self._seed = seed
+        self._c, self._start, self._period, self._seed = config, start, period_s, seed
         self._goals = config.program_goals()
+        self._channels = config.channel, config.channel_back or config.channel
         self._hand: Hand | None = None
+        self._console = Console(config.console, period_s)
+        most = min(config.duration_s / period_s, _MOST_PERIODS)
+        lives = [channel.life(period_s, round(most)) for channel in self._channels]
+        self._places = places(*lives, *map(copies, self._channels))
+        self.gains = np.concatenate([np.zeros(LAW_SIZE), goal_rows(self._goals).ravel()])
+        self.memory = np.zeros(self._places.end)
+        self._describe(lives)
         self.reset()
 
     @property
@@ -199,69 +183,137 @@ class Teleoperation:
         """Let `hand` take the simulated operator's place, from the next `reset` on."""
         self._hand = hand
 
+    def _describe(self, lives: Sequence[int]) -> None:
+        """Fill the numbers; those of the mapping and of the hand come with `reset`."""
+        c, law, at = self._c, laid_over(Law, self.gains), self._places
+        near, far = law.operator, law.remote
+        law.hold_end_s, law.start[:] = c.hold_end_s, self._start
+        for side in (near, far):
+            take(side, c)
+            side.passivity, side.period_s = MODES[c.passivity], self._period
+            take(side.receiver, c.receiver)
+            take(side.tank, c.tanks)
+            take(side.control, c.passivity_control)
+        near.start_tip[:] = self._start
+        self._console.describe(near.console)
+        self._noise_m = describe_operator(near.operator, c.operator, self._period)
+        near.operator.goals, near.operator.goal_count = LAW_SIZE, len(self._goals)
+        near.operator.tremor, near.operator.scatter = at.tremor, at.scatter
+        lines = (
+            (law.forth, far.receiver, at.forth_draws, at.forth_ring, at.forth_taken),
+            (law.back, near.receiver, at.back_draws, at.back_ring, at.back_taken),
+        )
+        for (line, receiver, draws, ring, taken), config, life in zip(
+            lines, self._channels, lives, strict=True
+        ):
+            line.delay_s, line.draws, line.ring = config.delay_s, draws, ring
+            line.capacity = life * copies(config)
+            line.cumulative = receiver.cumulative = config.energy == "cumulative"
+            receiver.taken, receiver.window = taken, life
+
     def reset(self) -> None:
         """Handle at home, tip at its start, channels empty."""
-        c, seed = self._c, self._seed
-        operator, forth, back = (
-            np.random.SeedSequence(seed.entropy, spawn_key=(*seed.spawn_key, i)) for i in range(3)
-        )
-        channel_back = c.channel_back or c.channel
-        self._forth: Channel[OperatorMessage] = Channel(c.channel, np.random.default_rng(forth))
-        self._back: Channel[RemoteMessage] = Channel(channel_back, np.random.default_rng(back))
-        self._near = OperatorSide(
-            c.operator_side(),
-            self._goals,
-            self._start,
-            channel_back.energy,
-            operator,
-            self._hand,
-            self._period,
-        )
-        self._far = RemoteSide(c.remote_side(), self._start, c.channel.energy, self._period)
-        self._work = TipWork(self._start)
-        self._v_d = np.zeros(3)
-        self._done_s: float | None = None
-        self._values = np.zeros(sum(len(block.columns) for block in self.columns))
+        law, c = laid_over(Law, self.gains), self._c
+        self.memory[:] = 0.0
+        state, memory = laid_over(State, self.memory), self.memory
+        near, far = state.operator, state.remote
+        self._console.reset(law.operator.console, near.console)
+        align(law.operator.operator.mapping, c.mapping, near.console.state.position, self._start)
+        state.ends = bool(self._goals) or self._hand is not None
+        near.in_python = self._hand is not None
+        near.scale = 1.0
+        for side_law, side in ((law.operator, near), (law.remote, far)):
+            fill_tank(side_law.tank, side.tank)
+            expect(side_law.receiver, side.receiver, memory)
+        state.work.p[:] = self._start
+        state.forth.drawn = state.back.drawn = near.operator.shaken = near.operator.scattered = DRAWN
+        self._random = [np.random.default_rng(_child(self._seed, *key)) for key in _STREAMS]
+        self.refill(1)
+
+    def refill(self, ticks: int) -> None:
+        """Draw ahead what the next `ticks` periods may need, at most `DRAWN`."""
+        state, at = laid_over(State, self.memory), self._places
+        tremor, scatter, forth, back = self._random
+        operator = state.operator.operator
+        used = (state.forth.drawn, state.back.drawn, operator.shaken, operator.scattered)
+        if DRAWN - max(used) >= ticks:
+            return
+
+        def packets(channel: Any, config: ChannelConfig, random: np.random.Generator) -> _Draw:
+            return lambda rows: draw_packets(config, channel, random, rows)
+
+        def shakes(rows: Array) -> None:
+            rows[:] = self._noise_m * tremor.standard_normal(rows.shape)
+
+        def misses(rows: Array) -> None:
+            rows[:] = scatter.standard_normal(rows.shape)
+
+        def top_up(begin: int, size: int, used: int, draw: _Draw) -> int:
+            left = DRAWN - used
+            if left >= ticks:
+                return used
+            rows = self.memory[begin : begin + DRAWN * size].reshape(-1, size)
+            rows[:left] = rows[used:].copy()
+            draw(rows[left:])
+            return 0
+
+        for channel, config, random, begin in (
+            (state.forth, self._channels[0], forth, at.forth_draws),
+            (state.back, self._channels[1], back, at.back_draws),
+        ):
+            channel.drawn = top_up(begin, DRAW, int(channel.drawn), packets(channel, config, random))
+        operator.shaken = top_up(at.tremor, 3, int(operator.shaken), shakes)
+        operator.scattered = top_up(at.scatter, 3, int(operator.scattered), misses)
+
+    def act(self) -> None:
+        """Let the hand in Python act, in the midst of a period."""
+        assert self._hand is not None
+        side = laid_over(State, self.memory).operator
+        command = self._hand.step(float(side.t_s), side.tip.copy(), side.console.state.copy())
+        fill_action(side.hand, command)
+
+    def enter(self, entry: Array) -> None:
+        """Let the kernel call the C function that enters `act` (1,), see `surgsim.tick.python_part`."""
+        laid_over(Law, self.gains).operator.entry[:] = entry
 
     def command(self, t_s: float, feedback: Feedback | None = None) -> TipCommand:
         """Step both sides to `t_s` [s]; without feedback the tip is taken to be at its start, untouched."""
-        p, f = (self._start, np.zeros(3)) if feedback is None else (feedback.p_WT, feedback.f_T)
-        sent = self._near.step(t_s, self._back.receive(t_s))
-        self._forth.send(t_s, sent.message, sent.energy_j)
-        measured = RemoteMeasurement(position=p, force=-f, work_j=self._work.add(p, f))
-        order = self._far.step(t_s, self._forth.receive(t_s), measured)
-        self._back.send(t_s, order.message, order.energy_j)
-        if sent.hand.done and self._done_s is None:
-            self._done_s = t_s
-        return self._told(t_s, sent, order, f)
+        told, kernel = new_feedback(), as_parameter(teleoperate, task_signature())
+        told.t_s, told.p_WT[:] = t_s, self._start if feedback is None else feedback.p_WT
+        told.f_T[:] = 0.0 if feedback is None else feedback.f_T
+        self.refill(1)
+        if self._hand is None:
+            kernel(self.gains, told, self.memory, self._out)
+            return command_of(self._out)
+        before, entered = laid_over(Law, self.gains).operator.entry.copy(), PythonPart(self.act)
+        self.enter(entered.gains)
+        status = kernel(self.gains, told, self.memory, self._out)
+        self.enter(before)
+        if status != GOES_ON:
+            error = entered.raised()
+            assert error is not None, f"status {status} and no error"
+            raise error
+        return command_of(self._out)
+
+    @cached_property
+    def _out(self) -> Any:
+        return new_command()
 
     def values(self) -> Array:
-        """Values of `columns` at the last command."""
-        return self._values
+        """Values of `columns` at the last `command`."""
+        values: Array = self._out.values[: width(COLUMNS)].copy()
+        return values
 
     def finished(self, t_s: float) -> bool:
         """Whether the operator has been done for `hold_end_s`; a simulated one without goals holds on."""
-        ends = bool(self._goals) or self._hand is not None
-        return ends and self._done_s is not None and t_s >= self._done_s + self._c.hold_end_s
+        law, state = laid_over(Law, self.gains), laid_over(State, self.memory)
+        return bool(state.ends and state.is_done and t_s >= state.done_s + law.hold_end_s)
 
-    def _told(self, t_s: float, sent: OperatorOutput, order: RemoteOutput, f_T: Array) -> TipCommand:
-        newest = self._far.receiver.newest
-        self._values = np.array(
-            (
-                *self._near.signals(),
-                *self._far.signals(),
-                *account(self._near, self._far, self._forth, self._back),
-                *sent.message.velocity,
-                np.nan if newest is None else t_s - newest.sent_s,
-            )
-        )
-        a_d = (order.velocity - self._v_d) / self._period
-        self._v_d = order.velocity
-        limited = self._c.passivity == "tank"
-        return TipCommand(
-            p_WTd=self._start if newest is None else newest.content.position,
-            v_WTd=order.velocity,
-            a_WTd=a_d,
-            jaw=order.jaw,
-            budget=EnergyBudget(most_j=order.budget_j, f_T=f_T) if limited else None,
-        )
+
+_Draw = Callable[[Array], None]
+_STREAMS = ((0, 0), (0, 1), (1,), (2,))
+"""Children of the seed: tremor, scatter, packets to the remote side and back."""
+
+
+def _child(seed: np.random.SeedSequence, *key: int) -> np.random.SeedSequence:
+    return np.random.SeedSequence(seed.entropy, spawn_key=(*seed.spawn_key, *key))

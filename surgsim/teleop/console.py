@@ -1,19 +1,20 @@
 """The master console: a force-controlled haptic arm in its own MuJoCo model, with its energy account."""
 
-import math
-from dataclasses import dataclass
+from typing import Any, ClassVar
 
 import mujoco
-import numpy as np
-from numpy.typing import NDArray
 from pydantic import PositiveFloat
 
 from surgsim.catalog import PartConfig
 from surgsim.compiled import compiled
 from surgsim.resources import resource_dir
+from surgsim.tick.algebra import norm, times, transposed_times
+from surgsim.tick.arrays import Array, Record, new
+from surgsim.tick.mujoco_calls import mj_jacSite, mj_step1, mj_step2
+from surgsim.tick.views import vector
 
-Array = NDArray[np.float64]
 JOINTS = ("yaw", "shoulder", "elbow", "gimbal_yaw", "gimbal_pitch", "gimbal_roll")
+_N = len(JOINTS)
 
 
 class ConsoleConfig(PartConfig):
@@ -43,12 +44,11 @@ class ConsoleConfig(PartConfig):
         return round(ratio)
 
 
-@dataclass(frozen=True, kw_only=True, slots=True)
-class ConsoleState:
+class ConsoleState(Record):
     """What the console measures.
 
     Attributes:
-        t_s: Time since the reset.
+        t_s: Time since the reset [s].
         q: Joint positions (6,) [rad].
         v: Joint velocities (6,) [rad/s].
         position: Handle position in O (3,) [m].
@@ -57,6 +57,14 @@ class ConsoleState:
         angular_velocity: Handle angular velocity in O (3,) [rad/s].
     """
 
+    SHAPES: ClassVar[dict[str, str]] = {
+        "q": str(_N),
+        "v": str(_N),
+        "position": "3",
+        "rotation": "3 3",
+        "velocity": "3",
+        "angular_velocity": "3",
+    }
     t_s: float
     q: Array
     v: Array
@@ -66,8 +74,7 @@ class ConsoleState:
     angular_velocity: Array
 
 
-@dataclass(frozen=True, kw_only=True, slots=True)
-class ConsoleEnergy:
+class ConsoleEnergy(Record):
     """Energy account since the reset [J].
 
     Attributes:
@@ -78,6 +85,8 @@ class ConsoleEnergy:
         hand_j: Work of the hand on the handle.
         damping_j: Burnt by viscous joint friction.
         friction_j: Burnt by dry joint friction and the joints' stops.
+        rendered_j: Work of the rendered force alone.
+        residual_j: Stored - brought in + burnt: zero but for the integration error.
     """
 
     kinetic_j: float
@@ -87,30 +96,76 @@ class ConsoleEnergy:
     hand_j: float
     damping_j: float
     friction_j: float
-
-    @property
-    def rendered_j(self) -> float:
-        """Work of the rendered force alone."""
-        return self.motor_j - self.gravity_compensation_j
-
-    @property
-    def residual_j(self) -> float:
-        """Stored - brought in + burnt: zero but for the integration error."""
-        brought = self.motor_j + self.hand_j
-        return self.kinetic_j + self.potential_j - brought + self.damping_j + self.friction_j
+    rendered_j: float
+    residual_j: float
 
 
-@compiled
-def _rendered_part(force: Array, J: Array, gravity: Array, torque_limit: Array, force_limit: float) -> float:
-    """Largest factor in [0, 1] that keeps |F| and every |J^T F + g| within its limit."""
-    norm = math.sqrt(force[0] ** 2 + force[1] ** 2 + force[2] ** 2)
-    factor = force_limit / norm if norm > force_limit else 1.0
-    for i in range(J.shape[1]):
-        torque = force[0] * J[0, i] + force[1] * J[1, i] + force[2] * J[2, i]
-        room = torque_limit[i] - gravity[i] if torque > 0.0 else torque_limit[i] + gravity[i]
-        if factor * abs(torque) > room:
-            factor = max(room, 0.0) / abs(torque)
-    return factor
+class ConsoleLaw(Record):
+    """Numbers of the console, and where MuJoCo's arrays are.
+
+    Attributes:
+        mj_model: Address of MuJoCo's model.
+        mj_data: Address of MuJoCo's data.
+        qpos: Address of the joint positions; as the following, of the array of MuJoCo's data by that name.
+        qvel: Joint velocities.
+        ctrl: Controls.
+        qfrc_applied: Applied generalized forces.
+        qfrc_actuator: Of the motors, gravity compensation included.
+        qfrc_gravcomp: Of gravity compensation.
+        qfrc_constraint: Of dry friction and stops.
+        energy: Potential and kinetic energy.
+        site_xpos: The handle's place.
+        site_xmat: Its orientation.
+        site: Its site.
+        substeps: Physics steps in a control period.
+        timestep_s: Physics step [s].
+        force_limit_n: As in `ConsoleConfig`.
+        least_mass_kg: As in `ConsoleConfig`.
+        torque_limit: Of the motors (6,) [N m].
+        damping: Viscous joint friction (6,) [N m s/rad].
+    """
+
+    SHAPES: ClassVar[dict[str, str]] = {"torque_limit": str(_N), "damping": str(_N)}
+    mj_model: int
+    mj_data: int
+    qpos: int
+    qvel: int
+    ctrl: int
+    qfrc_applied: int
+    qfrc_actuator: int
+    qfrc_gravcomp: int
+    qfrc_constraint: int
+    energy: int
+    site_xpos: int
+    site_xmat: int
+    site: int
+    substeps: int
+    timestep_s: float
+    force_limit_n: float
+    least_mass_kg: float
+    torque_limit: Array
+    damping: Array
+
+
+class ConsoleMemory(Record):
+    """State of the console beside MuJoCo's.
+
+    Attributes:
+        state: What it measures.
+        account: Its energy.
+        potential_j: Potential energy at the reset [J].
+        J: Jacobian of the handle (6, 6).
+        before: Joint velocities before a step (6,) [rad/s].
+        moved: Path of the joints over a step (6,) [rad].
+    """
+
+    SHAPES: ClassVar[dict[str, str]] = {"J": f"6 {_N}", "before": str(_N), "moved": str(_N)}
+    state: ConsoleState
+    account: ConsoleEnergy
+    potential_j: float
+    J: Array
+    before: Array
+    moved: Array
 
 
 def load_console() -> mujoco.MjModel:
@@ -118,107 +173,137 @@ def load_console() -> mujoco.MjModel:
     return mujoco.MjModel.from_xml_path(str(resource_dir("assets") / "console" / "console.xml"))
 
 
-class Console:
-    """The console's physics. `step` advances one control period under constant forces.
+@compiled
+def measure_console(law: ConsoleLaw, console: ConsoleMemory) -> None:
+    """Fill the Jacobian, the state and the energies of the present instant."""
+    J, state, account = console.J, console.state, console.account
+    mj_jacSite(law.mj_model, law.mj_data, J.ctypes.data, J.ctypes.data + 8 * 3 * _N, law.site)
+    place, turn = vector(law.site_xpos, 3), vector(law.site_xmat, 9)
+    qpos, qvel, energy = vector(law.qpos, _N), vector(law.qvel, _N), vector(law.energy, 2)
+    for i in range(_N):
+        state.q[i], state.v[i] = qpos[i], qvel[i]
+    times(J[:3], qvel, state.velocity)
+    times(J[3:], qvel, state.angular_velocity)
+    for i in range(3):
+        state.position[i] = place[i]
+        for k in range(3):
+            state.rotation[i, k] = turn[3 * i + k]
+    account.kinetic_j, account.potential_j = energy[1], energy[0] - console.potential_j
+    account.rendered_j = account.motor_j - account.gravity_compensation_j
+    account.residual_j = account.kinetic_j + account.potential_j - (account.motor_j + account.hand_j)
+    account.residual_j += account.damping_j + account.friction_j
+
+
+@compiled
+def step_console(law: ConsoleLaw, console: ConsoleMemory, wrench: Array, hand_wrench: Array) -> None:
+    """Advance one control period under constant forces.
 
     Joint torques: tau = J^T F + g(q), cut at each motor's limit; J of the handle's site.
+
+    Args:
+        law: Its numbers.
+        console: Its state.
+        wrench: Force and torque that the motors should render at the handle, in O (6,) [N, N m].
+        hand_wrench: Force and torque of the hand on the handle, in O (6,) [N, N m].
+    """
+    transposed_times(console.J, wrench, vector(law.ctrl, _N))
+    for _ in range(law.substeps):
+        transposed_times(console.J, hand_wrench, vector(law.qfrc_applied, _N))
+        _step_physics(law, console)
+        console.state.t_s += law.timestep_s
+        measure_console(law, console)
+
+
+@compiled
+def _step_physics(law: ConsoleLaw, console: ConsoleMemory) -> None:
+    """One physics step; work is force times the step's mean velocity (exact for a constant mass)."""
+    qvel, before, moved, account = vector(law.qvel, _N), console.before, console.moved, console.account
+    for i in range(_N):
+        before[i] = qvel[i]
+    mj_step2(law.mj_model, law.mj_data)
+    actuator, gravity = vector(law.qfrc_actuator, _N), vector(law.qfrc_gravcomp, _N)
+    applied, constraint = vector(law.qfrc_applied, _N), vector(law.qfrc_constraint, _N)
+    motor = compensation = hand = damping = friction = 0.0
+    for i in range(_N):
+        moved[i] = 0.5 * law.timestep_s * (before[i] + qvel[i])
+        motor += actuator[i] * moved[i]
+        compensation += gravity[i] * moved[i]
+        hand += applied[i] * moved[i]
+        damping += law.damping[i] * qvel[i] * moved[i]  # implicit in the velocity, as the integrator has it
+        friction -= constraint[i] * moved[i]
+    account.motor_j += motor
+    account.gravity_compensation_j += compensation
+    account.hand_j += hand
+    account.damping_j += damping
+    account.friction_j += friction
+    mj_step1(law.mj_model, law.mj_data)
+
+
+@compiled
+def renderable(law: ConsoleLaw, console: ConsoleMemory, force: Array) -> None:
+    """Shorten `force` at the handle in O (3,) [N] to what the limit and the motors allow.
+
+    By the largest factor in [0, 1] that keeps |F| and every |J^T F + g| within its limit.
+    """
+    gravity, J = vector(law.qfrc_gravcomp, _N), console.J
+    size = norm(force)
+    factor = law.force_limit_n / size if size > law.force_limit_n else 1.0
+    for i in range(_N):
+        torque = force[0] * J[0, i] + force[1] * J[1, i] + force[2] * J[2, i]
+        room = law.torque_limit[i] - gravity[i] if torque > 0.0 else law.torque_limit[i] + gravity[i]
+        if factor * abs(torque) > room:
+            factor = max(room, 0.0) / abs(torque)
+    for i in range(3):
+        force[i] = factor * force[i]
+
+
+class Console:
+    """A console's model and data, and what kernels need of it.
+
+    Attributes:
+        model: MuJoCo's model.
+        data: MuJoCo's data.
     """
 
     def __init__(self, config: ConsoleConfig, period_s: float = 0.001) -> None:
-        self.config = config
-        self._substeps = config.substeps(period_s)
-        self._timestep = period_s / self._substeps
+        self._c, self._substeps = config, config.substeps(period_s)
         self.model = load_console()
-        self.model.opt.timestep = self._timestep
+        self.model.opt.timestep = period_s / self._substeps
         self.data = mujoco.MjData(self.model)
-        self._site = self.model.site("handle").id
-        self._home = self.model.key("home").id
-        self._J = np.zeros((6, self.model.nv))
-        self._torque_limit = self.model.jnt_actfrcrange[:, 1].copy()
-        self._damping = self.model.dof_damping.copy().reshape(-1)
-        self._work = np.zeros(5)
-        self.reset()
 
-    def reset(self) -> ConsoleState:
-        """Put the arm at rest at its home pose and clear the account."""
-        mujoco.mj_resetDataKeyframe(self.model, self.data, self._home)
+    def describe(self, law: Any) -> None:
+        """Fill a `ConsoleLaw`, valid as long as this object lives."""
+        c, model, data = self._c, self.model, self.data
+        law.mj_model, law.mj_data = model._address, data._address
+        for name in (
+            "qpos",
+            "qvel",
+            "ctrl",
+            "qfrc_applied",
+            "qfrc_actuator",
+            "qfrc_gravcomp",
+            "qfrc_constraint",
+            "energy",
+        ):
+            law[name] = getattr(data, name).ctypes.data
+        law.site = model.site("handle").id
+        law.site_xpos = data.site_xpos[law.site].ctypes.data
+        law.site_xmat = data.site_xmat[law.site].ctypes.data
+        law.substeps, law.timestep_s = self._substeps, model.opt.timestep
+        law.force_limit_n, law.least_mass_kg = c.force_limit_n, c.least_mass_kg
+        law.torque_limit[:], law.damping[:] = model.jnt_actfrcrange[:, 1], model.dof_damping.reshape(-1)
+
+    def reset(self, law: Any, memory: Any) -> None:
+        """Put the arm at rest at its home pose; `memory`, a `ConsoleMemory`, must be zeros."""
+        mujoco.mj_resetDataKeyframe(self.model, self.data, self.model.key("home").id)
         mujoco.mj_step1(self.model, self.data)
-        self._refresh()
-        self._potential_at_start = float(self.data.energy[0])
-        self._work = np.zeros(5)
-        return self.state()
+        memory.potential_j = self.data.energy[0]
+        measure_console(law, memory)
 
-    def step(self, wrench: Array, hand_wrench: Array) -> ConsoleState:
-        """Advance one control period.
 
-        Args:
-            wrench: Force and torque that the motors should render at the handle, in O (6,) [N, N m].
-            hand_wrench: Force and torque of the hand on the handle, in O (6,) [N, N m].
-        """
-        self.data.ctrl[:] = wrench @ self._J
-        for _ in range(self._substeps):
-            self.data.qfrc_applied[:] = hand_wrench @ self._J
-            self._substep()
-        return self.state()
-
-    def state(self) -> ConsoleState:
-        """Copies of what the console measures now."""
-        data = self.data
-        twist = self._J @ data.qvel
-        return ConsoleState(
-            t_s=float(data.time),
-            q=data.qpos.copy(),
-            v=data.qvel.copy(),
-            position=data.site_xpos[self._site].copy(),
-            rotation=data.site_xmat[self._site].reshape(3, 3).copy(),
-            velocity=twist[:3],
-            angular_velocity=twist[3:],
-        )
-
-    def renderable(self, force: Array) -> Array:
-        """`force` at the handle in O (3,) [N], shortened to what the limit and the motors allow."""
-        factor = _rendered_part(
-            force, self._J, self.data.qfrc_gravcomp, self._torque_limit, self.config.force_limit_n
-        )
-        return force if factor == 1.0 else factor * force
-
-    def energy(self) -> ConsoleEnergy:
-        """The account since the reset."""
-        motor, compensation, hand, damping, friction = self._work.tolist()
-        return ConsoleEnergy(
-            kinetic_j=float(self.data.energy[1]),
-            potential_j=float(self.data.energy[0]) - self._potential_at_start,
-            motor_j=motor,
-            gravity_compensation_j=compensation,
-            hand_j=hand,
-            damping_j=damping,
-            friction_j=friction,
-        )
-
-    @property
-    def rendered_j(self) -> float:
-        """Work of the rendered force since the reset, without gravity compensation [J]."""
-        return float(self._work[0] - self._work[1])
-
-    def _substep(self) -> None:
-        """One physics step; work is force times the step's mean velocity (exact for a constant mass)."""
-        data = self.data
-        before = data.qvel.copy()
-        mujoco.mj_step2(self.model, data)
-        after = data.qvel
-        path = 0.5 * self._timestep * (before + after)
-        forces = np.array(
-            [
-                data.qfrc_actuator,
-                data.qfrc_gravcomp,
-                data.qfrc_applied,
-                self._damping * after,  # implicit in the velocity, as the integrator has it
-                -data.qfrc_constraint,
-            ]
-        )
-        self._work += forces @ path
-        mujoco.mj_step1(self.model, data)
-        self._refresh()
-
-    def _refresh(self) -> None:
-        mujoco.mj_jacSite(self.model, self.data, self._J[:3], self._J[3:], self._site)
+def new_console(config: ConsoleConfig, period_s: float = 0.001) -> tuple[Console, Any, Any]:
+    """A console at rest with its numbers (`ConsoleLaw`) and its state (`ConsoleMemory`)."""
+    console, law, memory = Console(config, period_s), new(ConsoleLaw, 0), new(ConsoleMemory, 0)
+    console.describe(law)
+    console.reset(law, memory)
+    return console, law, memory

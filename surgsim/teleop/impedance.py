@@ -1,40 +1,30 @@
 """The hand on the handle: a spring and damper between where it is meant to be and where it is."""
 
-from typing import Protocol
-
-import numpy as np
-from numpy.typing import NDArray
-
+from surgsim.compiled import compiled
 from surgsim.teleop.console import ConsoleState
-
-Array = NDArray[np.float64]
-
-
-class Grip(Protocol):
-    """Stiffness and damping of the hand; `OperatorConfig` has them."""
-
-    @property
-    def stiffness_n_per_m(self) -> float:
-        """K."""
-        ...
-
-    @property
-    def damping_ns_per_m(self) -> float:
-        """D."""
-        ...
-
-    @property
-    def turn_stiffness_nm_per_rad(self) -> float:
-        """K_R."""
-        ...
-
-    @property
-    def turn_damping_nms_per_rad(self) -> float:
-        """D_R."""
-        ...
+from surgsim.tick.arrays import Array, Record
 
 
-def hand_wrench(grip: Grip, position: Array, velocity: Array, upright: Array, handle: ConsoleState) -> Array:
+class Grip(Record):
+    """Stiffness and damping of the hand.
+
+    Attributes:
+        stiffness_n_per_m: K.
+        damping_ns_per_m: D.
+        turn_stiffness_nm_per_rad: K_R.
+        turn_damping_nms_per_rad: D_R.
+    """
+
+    stiffness_n_per_m: float
+    damping_ns_per_m: float
+    turn_stiffness_nm_per_rad: float
+    turn_damping_nms_per_rad: float
+
+
+@compiled
+def hand_wrench(
+    grip: Grip, position: Array, velocity: Array, upright: Array, handle: ConsoleState, out: Array
+) -> None:
     """Force and torque of the hand on the handle in O (6,) [N, N m].
 
         F = K (x - x_o) + D (v - v_o),   M = -K_R theta - D_R w_o
@@ -45,12 +35,14 @@ def hand_wrench(grip: Grip, position: Array, velocity: Array, upright: Array, ha
         velocity: v, how it is meant to move (3,) [m/s].
         upright: Orientation that the hand keeps (3, 3); theta is the turn away from it.
         handle: The console.
+        out: Filled with force and torque.
     """
-    wrench = np.empty(6)
-    wrench[:3] = grip.stiffness_n_per_m * (position - handle.position)
-    wrench[:3] += grip.damping_ns_per_m * (velocity - handle.velocity)
-    R = handle.rotation @ upright.T
-    turned = 0.5 * np.array([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]])
-    wrench[3:] = -grip.turn_stiffness_nm_per_rad * turned
-    wrench[3:] -= grip.turn_damping_nms_per_rad * handle.angular_velocity
-    return wrench
+    for i in range(3):
+        out[i] = grip.stiffness_n_per_m * (position[i] - handle.position[i])
+        out[i] += grip.damping_ns_per_m * (velocity[i] - handle.velocity[i])
+        a, b = (i + 1) % 3, (i + 2) % 3  # theta_i = (R_ba - R_ab) / 2 of R = R_o upright^T
+        turned = 0.0
+        for k in range(3):
+            turned += handle.rotation[b, k] * upright[a, k] - handle.rotation[a, k] * upright[b, k]
+        out[3 + i] = -grip.turn_stiffness_nm_per_rad * (0.5 * turned)
+        out[3 + i] -= grip.turn_damping_nms_per_rad * handle.angular_velocity[i]

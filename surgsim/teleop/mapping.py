@@ -1,15 +1,14 @@
 """Alignment of the console with the remote world, and the force law written in it."""
 
-from dataclasses import dataclass
-from typing import Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from pydantic import PositiveFloat, model_validator
 
 from surgsim.catalog import PartConfig
-
-Array = NDArray[np.float64]
+from surgsim.compiled import compiled
+from surgsim.tick.arrays import Array, Record
 
 
 class MappingConfig(PartConfig):
@@ -41,8 +40,7 @@ def rotation_matrix(wxyz: ArrayLike) -> Array:
     )
 
 
-@dataclass(frozen=True, kw_only=True)
-class Mapping:
+class Mapping(Record):
     """p_W = home_W + s R_WO (p_O - home_O).
 
     Attributes:
@@ -52,39 +50,63 @@ class Mapping:
         home_W: Remote tip position that belongs to `home_O` (3,) [m].
     """
 
+    SHAPES: ClassVar[dict[str, str]] = {"R_WO": "3 3", "home_O": "3", "home_W": "3"}
     scale: float
     R_WO: Array
     home_O: Array
     home_W: Array
 
-    @classmethod
-    def aligned(cls, config: MappingConfig, home_O: ArrayLike, home_W: ArrayLike) -> Self:
-        """Mapping in which the handle at `home_O` stands for the tip at `home_W`."""
-        return cls(
-            scale=config.scale,
-            R_WO=rotation_matrix(config.rotation_wxyz),
-            home_O=np.array(home_O, dtype=float),
-            home_W=np.array(home_W, dtype=float),
-        )
 
-    def to_remote(self, p_O: Array) -> Array:
-        """Tip position (3,) for a handle position (3,)."""
-        return self.home_W + self.scale * (self.R_WO @ (p_O - self.home_O))
-
-    def to_console(self, p_W: Array) -> Array:
-        """Handle position (3,) for a tip position (3,)."""
-        return self.home_O + ((p_W - self.home_W) @ self.R_WO) / self.scale
-
-    def motion_to_remote(self, v_O: Array) -> Array:
-        """Remote displacement or velocity s R_WO v_O (3,)."""
-        return np.asarray(self.scale * (self.R_WO @ v_O))
-
-    def motion_to_console(self, v_W: Array) -> Array:
-        """Handle displacement or velocity R_OW v_W / s (3,)."""
-        return np.asarray((v_W @ self.R_WO) / self.scale)
+def align(mapping: Any, config: MappingConfig, home_O: ArrayLike, home_W: ArrayLike) -> None:
+    """Let the handle at `home_O` (3,) [m] stand for the tip at `home_W` (3,) [m]."""
+    mapping.scale, mapping.R_WO[:] = config.scale, rotation_matrix(config.rotation_wxyz)
+    mapping.home_O[:], mapping.home_W[:] = home_O, home_W
 
 
-def feedback_force(mapping: Mapping, p_handle_O: Array, p_tip_W: Array, stiffness_n_per_m: float) -> Array:
+@compiled
+def to_remote(mapping: Mapping, p_O: Array, out: Array) -> None:
+    """Tip position (3,) for a handle position (3,)."""
+    for i in range(3):
+        turned = 0.0
+        for k in range(3):
+            turned += mapping.R_WO[i, k] * (p_O[k] - mapping.home_O[k])
+        out[i] = mapping.home_W[i] + mapping.scale * turned
+
+
+@compiled
+def to_console(mapping: Mapping, p_W: Array, out: Array) -> None:
+    """Handle position (3,) for a tip position (3,)."""
+    for i in range(3):
+        turned = 0.0
+        for k in range(3):
+            turned += (p_W[k] - mapping.home_W[k]) * mapping.R_WO[k, i]
+        out[i] = mapping.home_O[i] + turned / mapping.scale
+
+
+@compiled
+def motion_to_remote(mapping: Mapping, v_O: Array, out: Array) -> None:
+    """Remote displacement or velocity s R_WO v_O (3,); not in place."""
+    for i in range(3):
+        turned = 0.0
+        for k in range(3):
+            turned += mapping.R_WO[i, k] * v_O[k]
+        out[i] = mapping.scale * turned
+
+
+@compiled
+def motion_to_console(mapping: Mapping, v_W: Array, out: Array) -> None:
+    """Handle displacement or velocity R_OW v_W / s (3,); not in place."""
+    for i in range(3):
+        turned = 0.0
+        for k in range(3):
+            turned += v_W[k] * mapping.R_WO[k, i]
+        out[i] = turned / mapping.scale
+
+
+@compiled
+def feedback_force(
+    mapping: Mapping, p_handle_O: Array, p_tip_W: Array, stiffness_n_per_m: float, out: Array
+) -> None:
     """Force on the handle in console axes (3,) [N]: F = K_v (x_r(t - delta) - x_o(t)).
 
     Args:
@@ -92,8 +114,11 @@ def feedback_force(mapping: Mapping, p_handle_O: Array, p_tip_W: Array, stiffnes
         p_handle_O: Handle position x_o (3,) [m].
         p_tip_W: Remote tip position as last received, x_r(t - delta) (3,) [m].
         stiffness_n_per_m: K_v, per metre of handle motion.
+        out: Filled with the force.
 
     Source:
         Section 2.2 of the passive teleoperation paper (10.1002/rnc.7613); the joint torques follow as J^T F.
     """
-    return np.asarray(stiffness_n_per_m * (mapping.to_console(p_tip_W) - p_handle_O))
+    to_console(mapping, p_tip_W, out)
+    for i in range(3):
+        out[i] = stiffness_n_per_m * (out[i] - p_handle_O[i])

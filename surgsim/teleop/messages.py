@@ -1,38 +1,16 @@
-"""What the two sides tell each other."""
+"""What the two sides tell each other: a row of numbers, in remote world axes.
 
-from dataclasses import dataclass
+From the operator's side: the tip's position and velocity that the handle stands for, and how far the jaws
+close. From the remote side: the tip's position, also what the screen shows, and the force of the tip on its
+environment, which is shown and not used by the force law.
+"""
+
 from typing import Literal
 
-import numpy as np
-from numpy.typing import NDArray
-
-Array = NDArray[np.float64]
 PassivityMode = Literal["tank", "tdpa", "off"]
+TANK, TDPA, OFF = range(3)
+MODES: dict[PassivityMode, int] = {"tank": TANK, "tdpa": TDPA, "off": OFF}
+"""The number that stands for a mode in a record."""
 
-
-@dataclass(frozen=True, kw_only=True, slots=True)
-class OperatorMessage:
-    """From the operator to the remote side, in remote world axes.
-
-    Attributes:
-        position: Tip position that the handle stands for (3,) [m].
-        velocity: Tip velocity that the handle stands for (3,) [m/s].
-        jaw: Closing of the jaws, 0 to 1.
-    """
-
-    position: Array
-    velocity: Array
-    jaw: float
-
-
-@dataclass(frozen=True, kw_only=True, slots=True)
-class RemoteMessage:
-    """From the remote to the operator side, in remote world axes.
-
-    Attributes:
-        position: Tip position, also what the screen shows (3,) [m].
-        force: Force of the tip on its environment (3,) [N]; shown, not used by the force law.
-    """
-
-    position: Array
-    force: Array
+POSITION, VELOCITY, FORCE, JAW, CONTENT = 0, 3, 3, 6, 7
+"""Where in a message position (3,) [m], velocity (3,) [m/s] or force (3,) [N], and jaw are; its length."""

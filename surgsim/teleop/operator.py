@@ -1,22 +1,23 @@
 """A simulated operator: what the eyes see decides, the hand's impedance acts."""
 
-import enum
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import Any, ClassVar, Protocol
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
 from pydantic import NonNegativeFloat, PositiveFloat
 
 from surgsim.catalog import PartConfig
+from surgsim.compiled import compiled
 from surgsim.teleop.console import ConsoleState
-from surgsim.teleop.impedance import hand_wrench
-from surgsim.teleop.mapping import Mapping
-from surgsim.teleop.reach import Reach, ReachConfig, aim
-from surgsim.teleop.tremor import Tremor, TremorConfig
-
-Array = NDArray[np.float64]
+from surgsim.teleop.impedance import Grip, hand_wrench
+from surgsim.teleop.mapping import Mapping, motion_to_console
+from surgsim.teleop.reach import Reach, ReachConfig, ReachLaw, aim, reach_at
+from surgsim.teleop.tremor import TremorConfig, resonance, shake
+from surgsim.tick.algebra import dot
+from surgsim.tick.arrays import Array, Record
+from surgsim.tick.overlay import take
 
 
 class OperatorConfig(PartConfig):
@@ -65,9 +66,19 @@ class Goal:
     timeout_s: float = math.inf
 
 
+PLACE, TOLERANCE, DWELL_TIME, CLOSED, PUSH, TIMEOUT, GOAL = 0, 3, 4, 5, 6, 7, 8
+"""Where in a goal's row its numbers are, and its length."""
+
+
+def goal_rows(goals: Sequence[Goal]) -> Array:
+    """The goals as rows (k, 8)."""
+    rows = [(*g.position, g.tolerance_m, g.dwell_s, g.jaw, float(g.push), g.timeout_s) for g in goals]
+    return np.array(rows).reshape(-1, GOAL)
+
+
 @dataclass(frozen=True, kw_only=True, slots=True)
 class HandCommand:
-    """What the hand does in one period.
+    """What a hand in Python does in one period.
 
     Attributes:
         wrench: Force and torque on the handle in O (6,) [N, N m].
@@ -87,160 +98,286 @@ class HandCommand:
 
 
 class Hand(Protocol):
-    """Whoever holds the handle: the simulated operator, or a person at a keyboard."""
+    """Whoever holds the handle in the simulated operator's place: a person, or an outside class."""
 
-    def step(self, t_s: float, seen_tip: ArrayLike, handle: ConsoleState) -> HandCommand:
-        """What the hand does in the period from `t_s`, given the tip on the screen and the console."""
+    def step(self, t_s: float, seen_tip: Array, handle: Any) -> HandCommand:
+        """What the hand does in the period from `t_s`.
+
+        Args:
+            t_s: Time [s].
+            seen_tip: Remote tip as the screen shows it, already delayed (3,) [m].
+            handle: What the console measures, a copy of its `ConsoleState`.
+        """
         ...
 
 
-class Phase(enum.Enum):
-    """What the operator is doing."""
+class HandAction(Record):
+    """What the hand does in one period; as `HandCommand`."""
 
-    MOVE = "moving the hand"
-    WATCH = "waiting for the picture to rest"
-    DWELL = "staying at the goal"
-    DONE = "no goal is left"
+    SHAPES: ClassVar[dict[str, str]] = {"wrench": "6", "intended": "3"}
+    wrench: Array
+    jaw: float
+    goal: int
+    done: int
+    missed: int
+    intended: Array
 
 
-class Operator:
-    """Carries out a program of goals. Same seed and inputs, same forces.
+def fill_action(action: Any, command: HandCommand) -> None:
+    """Write what a hand in Python does."""
+    action.wrench[:], action.jaw, action.goal = command.wrench, command.jaw, command.goal
+    action.done, action.missed, action.intended[:] = command.done, command.missed, command.intended
 
-    Force on the handle: F = K (x_int + x_tremor - x_o) + D (v_int + v_tremor - v_o).
+
+MOVE, WATCH, DWELL, DONE = range(4)
+"""Phases: moving the hand, waiting for the picture to rest, staying at the goal, no goal is left."""
+
+
+class OperatorLaw(Record):
+    """Numbers of the operator: as in `OperatorConfig`, and what follows from them.
+
+    Attributes:
+        reaction_s: As in the config, like the next two.
+        expected_delay_s: The round trip that it is used to [s].
+        rest_speed_m_per_s: Slower counts as at rest.
+        period_s: Control period [s].
+        blur: How much of a new picture is taken in over a period.
+        jaw_step: Most that the jaws close in a period.
+        shake_last: a_1 of the tremor.
+        shake_before: a_2 of the tremor.
+        grip: The hand's impedance.
+        reach: How it reaches.
+        mapping: How it moves the handle to move the tip.
+        goals: Where the goals' rows begin in the gains.
+        goal_count: How many there are.
+        tremor: Where the tremor's noise begins in the memory, a row (3,) [m] for each period.
+        scatter: Where the scatter of movements begins, a row (3,) for each.
     """
 
-    def __init__(
-        self,
-        config: OperatorConfig,
-        goals: tuple[Goal, ...],
-        mapping: Mapping,
-        period_s: float,
-        seed: np.random.SeedSequence,
-    ) -> None:
-        self.config = config
-        self.goals = goals
-        self._mapping = mapping
-        self._period_s = period_s
-        self._seed = seed
-        self._blur = 1.0 - math.exp(-period_s / config.gaze_time_s)
-        self.reset()
+    reaction_s: float
+    expected_delay_s: float
+    rest_speed_m_per_s: float
+    period_s: float
+    blur: float
+    jaw_step: float
+    shake_last: float
+    shake_before: float
+    grip: Grip
+    reach: ReachLaw
+    mapping: Mapping
+    goals: int
+    goal_count: int
+    tremor: int
+    scatter: int
 
-    def reset(self) -> None:
-        """Forget everything; the next step begins the first goal."""
-        tremor, scatter = (
-            np.random.SeedSequence(self._seed.entropy, spawn_key=(*self._seed.spawn_key, i)) for i in (0, 1)
-        )
-        self._tremor = Tremor(self.config.tremor, self._period_s, np.random.default_rng(tremor))
-        self._rng = np.random.default_rng(scatter)
-        self._seen: Array | None = None
-        self._speed = np.zeros(3)
-        self._jaw = 0.0
-        self._index, self._missed = 0, 0
-        self._target: Array | None = None
-        self.phase = Phase.DONE
 
-    def step(self, t_s: float, seen_tip: ArrayLike, handle: ConsoleState) -> HandCommand:
-        """Look, decide, act.
+class Operator(Record):
+    """State of the operator.
 
-        Args:
-            t_s: Time.
-            seen_tip: Remote tip as the screen shows it, already delayed (3,) [m].
-            handle: The console.
-        """
-        self._look(np.asarray(seen_tip, dtype=float), handle, t_s)
-        self._decide(t_s)
-        intended, velocity = self._reach.at(t_s)
-        self._close_jaw()
-        return HandCommand(
-            wrench=self._act(intended, velocity, handle),
-            jaw=self._jaw,
-            goal=self._index,
-            done=self.phase is Phase.DONE,
-            missed=self._missed,
-            intended=intended,
-        )
+    Attributes:
+        begun: Whether it has looked once.
+        phase: See `MOVE` and the following.
+        index: The goal.
+        missed: Goals given up.
+        shaken: Rows of the tremor used.
+        scattered: Rows of the scatter used.
+        goal_start_s: When the goal was begun [s].
+        leave_s: When it may be left [s].
+        jaw: How far the jaws close.
+        reach: The movement.
+        seen: The tip as it is taken in (3,) [m].
+        speed: Its velocity (3,) [m/s].
+        target: Where the tip shall be (3,) [m]; NaN before the first goal.
+        upright: Orientation that the hand keeps (3, 3).
+        shake: Displacement by tremor (3,) [m].
+        shake_before: The one before it (3,) [m].
+    """
 
-    def _look(self, tip: Array, handle: ConsoleState, t_s: float) -> None:
-        if self._seen is None:
-            self._seen = tip.copy()
-            self._reach = Reach(start_s=t_s - 1.0, duration_s=1.0, origin=handle.position, change=np.zeros(3))
-            self._upright = handle.rotation
-            if self.goals:
-                self._begin(0, t_s)
+    SHAPES: ClassVar[dict[str, str]] = {
+        **{name: "3" for name in ("seen", "speed", "target", "shake", "shake_before")},
+        "upright": "3 3",
+    }
+    begun: int
+    phase: int
+    index: int
+    missed: int
+    shaken: int
+    scattered: int
+    goal_start_s: float
+    leave_s: float
+    jaw: float
+    reach: Reach
+    seen: Array
+    speed: Array
+    target: Array
+    upright: Array
+    shake: Array
+    shake_before: Array
+
+
+def describe_operator(law: Any, config: OperatorConfig, period_s: float) -> float:
+    """Fill all numbers but mapping and places; answers the standard deviation of the tremor's noise [m]."""
+    take(law, config)
+    take(law.grip, config)
+    take(law.reach, config.reach)
+    law.period_s, law.jaw_step = period_s, period_s / config.jaw_time_s
+    law.blur = 1.0 - math.exp(-period_s / config.gaze_time_s)
+    law.shake_last, law.shake_before, noise = resonance(config.tremor, period_s)
+    return noise
+
+
+@compiled
+def operate(
+    law: OperatorLaw,
+    gains: Array,
+    operator: Operator,
+    memory: Array,
+    t_s: float,
+    tip: Array,
+    handle: ConsoleState,
+    out: HandAction,
+) -> None:
+    """Look, decide, act: one period of a program of goals.
+
+    Force on the handle: F = K (x_int + x_tremor - x_o) + D (v_int + v_tremor - v_o).
+
+    Args:
+        law: Its numbers.
+        gains: Holds its goals.
+        operator: Its state.
+        memory: Holds its random draws.
+        t_s: Time [s].
+        tip: Remote tip as the screen shows it, already delayed (3,) [m].
+        handle: The console.
+        out: Filled with what the hand does.
+    """
+    _look(law, gains, operator, memory, t_s, tip, handle)
+    _decide(law, gains, operator, memory, t_s)
+    position, velocity = np.empty(3), np.empty(3)
+    reach_at(operator.reach, t_s, out.intended, velocity)
+    _close_jaw(law, gains, operator)
+    noise = law.tremor + 3 * operator.shaken
+    operator.shaken += 1
+    shaken, before = operator.shake, operator.shake_before
+    shake(law.shake_last, law.shake_before, memory[noise : noise + 3], shaken, before)
+    for i in range(3):
+        position[i] = out.intended[i] + shaken[i]
+        velocity[i] += (shaken[i] - before[i]) / law.period_s
+    hand_wrench(law.grip, position, velocity, operator.upright, handle, out.wrench)
+    out.jaw, out.goal, out.missed = operator.jaw, operator.index, operator.missed
+    out.done = 1 if operator.phase == DONE else 0
+
+
+@compiled
+def _goal(law: OperatorLaw, gains: Array, index: int) -> Array:
+    """The row of a goal."""
+    at = law.goals + GOAL * index
+    return gains[at : at + GOAL]
+
+
+@compiled
+def _look(
+    law: OperatorLaw,
+    gains: Array,
+    operator: Operator,
+    memory: Array,
+    t_s: float,
+    tip: Array,
+    handle: ConsoleState,
+) -> None:
+    """Take the picture in through a low-pass; at first, begin the program."""
+    if operator.begun:
+        for i in range(3):
+            change = law.blur * (tip[i] - operator.seen[i])
+            operator.seen[i] += change
+            operator.speed[i] += law.blur * (change / law.period_s - operator.speed[i])
+        return
+    operator.begun, operator.phase = 1, DONE
+    operator.reach.start_s, operator.reach.duration_s = t_s - 1.0, 1.0
+    for i in range(3):
+        operator.seen[i], operator.reach.origin[i], operator.target[i] = tip[i], handle.position[i], math.nan
+        for k in range(3):
+            operator.upright[i, k] = handle.rotation[i, k]
+    if law.goal_count > 0:
+        _begin(law, gains, operator, memory, 0, t_s)
+
+
+@compiled
+def _begin(law: OperatorLaw, gains: Array, operator: Operator, memory: Array, index: int, t_s: float) -> None:
+    """Take a goal up."""
+    operator.index, operator.goal_start_s = index, t_s
+    if index == law.goal_count:
+        operator.phase = DONE
+        return
+    goal, stays = _goal(law, gains, index), True
+    for i in range(3):
+        stays = stays and operator.target[i] == goal[PLACE + i]
+        operator.target[i] = goal[PLACE + i]
+    if stays and _distance(operator) <= goal[TOLERANCE]:
+        operator.phase, operator.leave_s = DWELL, t_s + law.expected_delay_s + goal[DWELL_TIME]
+        return
+    _move(law, gains, operator, memory, t_s)
+
+
+@compiled
+def _move(law: OperatorLaw, gains: Array, operator: Operator, memory: Array, t_s: float) -> None:
+    """Aim the hand so that the tip, seen where it is, would reach the goal; begin after the reaction."""
+    origin, change, reach = np.empty(3), np.empty(3), operator.reach
+    reach_at(reach, t_s, origin, change)
+    for i in range(3):
+        reach.origin[i], origin[i] = origin[i], operator.target[i] - operator.seen[i]
+    motion_to_console(law.mapping, origin, change)
+    for i in range(3):
+        change[i] += reach.origin[i]
+    width = 2.0 * _goal(law, gains, operator.index)[TOLERANCE] / law.mapping.scale
+    noise = law.scatter + 3 * operator.scattered
+    operator.scattered += 1
+    aim(law.reach, reach, change, width, t_s + law.reaction_s, memory[noise : noise + 3])
+    operator.phase = MOVE
+
+
+@compiled
+def _decide(law: OperatorLaw, gains: Array, operator: Operator, memory: Array, t_s: float) -> None:
+    """Give a goal up, go on to the next phase, or correct."""
+    if operator.phase == DONE:
+        return
+    goal, reach = _goal(law, gains, operator.index), operator.reach
+    end_s = reach.start_s + reach.duration_s
+    if t_s - operator.goal_start_s > goal[TIMEOUT]:
+        operator.missed += 1
+        _begin(law, gains, operator, memory, operator.index + 1, t_s)
+    elif operator.phase == MOVE:
+        if t_s >= end_s:
+            operator.phase = DWELL if goal[PUSH] == 1.0 else WATCH
+            operator.leave_s = t_s + goal[DWELL_TIME]
+    elif operator.phase == WATCH:
+        rests = dot(operator.speed, operator.speed) < law.rest_speed_m_per_s * law.rest_speed_m_per_s
+        if t_s < end_s + law.expected_delay_s or not rests:
             return
-        change = self._blur * (tip - self._seen)
-        self._seen = self._seen + change
-        self._speed = self._speed + self._blur * (change / self._period_s - self._speed)
-
-    def _begin(self, index: int, t_s: float) -> None:
-        self._index, self._goal_start_s = index, t_s
-        if index == len(self.goals):
-            self.phase = Phase.DONE
-            return
-        goal, before = self.goals[index], self._target
-        self._target = np.array(goal.position)
-        if (
-            before is not None
-            and np.array_equal(before, self._target)
-            and self._distance() <= goal.tolerance_m
-        ):
-            self.phase, self._leave_s = Phase.DWELL, t_s + self.config.expected_delay_s + goal.dwell_s
-            return
-        self._move(t_s)
-
-    def _move(self, t_s: float) -> None:
-        """Aim the hand so that the tip, seen where it is, would reach the goal; begin after the reaction."""
-        assert self._seen is not None
-        assert self._target is not None
-        origin = self._reach.at(t_s)[0]
-        change = self._mapping.motion_to_console(self._target - self._seen)
-        width = 2.0 * self.goals[self._index].tolerance_m / self._mapping.scale
-        start = t_s + self.config.reaction_s
-        self._reach = aim(origin, origin + change, width, start, self.config.reach, self._rng)
-        self.phase = Phase.MOVE
-
-    def _decide(self, t_s: float) -> None:
-        if self.phase is Phase.DONE:
-            return
-        goal = self.goals[self._index]
-        if t_s - self._goal_start_s > goal.timeout_s:
-            self._missed += 1
-            self._begin(self._index + 1, t_s)
-        elif self.phase is Phase.MOVE:
-            self._finish_move(t_s, goal)
-        elif self.phase is Phase.WATCH:
-            self._watch(t_s, goal)
-        elif t_s >= self._leave_s:
-            self._begin(self._index + 1, t_s)
-        elif not goal.push and self._distance() > goal.tolerance_m:
-            self._move(t_s)
-
-    def _finish_move(self, t_s: float, goal: Goal) -> None:
-        if t_s < self._reach.end_s:
-            return
-        self.phase = Phase.DWELL if goal.push else Phase.WATCH
-        self._leave_s = t_s + goal.dwell_s
-
-    def _watch(self, t_s: float, goal: Goal) -> None:
-        rests = float(self._speed @ self._speed) < self.config.rest_speed_m_per_s**2
-        if t_s < self._reach.end_s + self.config.expected_delay_s or not rests:
-            return
-        if self._distance() <= goal.tolerance_m:
-            self.phase, self._leave_s = Phase.DWELL, t_s + goal.dwell_s
+        if _distance(operator) <= goal[TOLERANCE]:
+            operator.phase, operator.leave_s = DWELL, t_s + goal[DWELL_TIME]
         else:
-            self._move(t_s)
+            _move(law, gains, operator, memory, t_s)
+    elif t_s >= operator.leave_s:
+        _begin(law, gains, operator, memory, operator.index + 1, t_s)
+    elif goal[PUSH] == 0.0 and _distance(operator) > goal[TOLERANCE]:
+        _move(law, gains, operator, memory, t_s)
 
-    def _distance(self) -> float:
-        assert self._seen is not None
-        assert self._target is not None
-        error = self._target - self._seen
-        return math.sqrt(float(error @ error))
 
-    def _close_jaw(self) -> None:
-        wanted = self.goals[min(self._index, len(self.goals) - 1)].jaw if self.goals else 0.0
-        most = self._period_s / self.config.jaw_time_s
-        self._jaw += min(max(wanted - self._jaw, -most), most)
+@compiled
+def _distance(operator: Operator) -> float:
+    """From the tip as it is seen to the target [m]."""
+    square = 0.0
+    for i in range(3):
+        error = operator.target[i] - operator.seen[i]
+        square += error * error
+    return math.sqrt(square)
 
-    def _act(self, intended: Array, velocity: Array, handle: ConsoleState) -> Array:
-        shake, shake_velocity = self._tremor.step()
-        return hand_wrench(self.config, intended + shake, velocity + shake_velocity, self._upright, handle)
+
+@compiled
+def _close_jaw(law: OperatorLaw, gains: Array, operator: Operator) -> None:
+    """Close the jaws as the goal, or the last one, wants it."""
+    wanted = 0.0
+    if law.goal_count > 0:
+        wanted = _goal(law, gains, min(operator.index, law.goal_count - 1))[CLOSED]
+    operator.jaw += min(max(wanted - operator.jaw, -law.jaw_step), law.jaw_step)

@@ -1,25 +1,22 @@
 """The operator's side: console, hand, force law, tank or passivity controller."""
 
-import math
-from collections.abc import Iterable
-from dataclasses import dataclass
+from typing import ClassVar
 
-import numpy as np
-from numpy.typing import ArrayLike, NDArray
-from pydantic import NonNegativeFloat
-
-from surgsim.catalog import PartConfig
 from surgsim.columns import scalar, vector
-from surgsim.teleop import passivity_control
-from surgsim.teleop import tank as tanks
-from surgsim.teleop.channel import EnergyMode, Packet
-from surgsim.teleop.console import Console, ConsoleConfig
-from surgsim.teleop.mapping import Mapping, MappingConfig, feedback_force
-from surgsim.teleop.messages import OperatorMessage, PassivityMode, RemoteMessage
-from surgsim.teleop.operator import Goal, Hand, HandCommand, Operator, OperatorConfig
-from surgsim.teleop.receiver import Receiver, ReceiverConfig
+from surgsim.compiled import compiled
+from surgsim.teleop.channel import Channel, ChannelLaw
+from surgsim.teleop.console import ConsoleLaw, ConsoleMemory, renderable, step_console
+from surgsim.teleop.mapping import feedback_force, motion_to_remote, to_remote
+from surgsim.teleop.messages import CONTENT, JAW, OFF, POSITION, TDPA, VELOCITY
+from surgsim.teleop.operator import HandAction, Operator, OperatorLaw, operate
+from surgsim.teleop.passivity_control import PassivityLaw, PortEnergy, impedance_control, observe, observed
+from surgsim.teleop.receiver import Receiver, ReceiverLaw, receive
+from surgsim.teleop.tank import Tank, TankLaw, affordable, exchange, level, send_surplus
+from surgsim.tick.algebra import dot
+from surgsim.tick.arrays import Array, Record
+from surgsim.tick.python_part import enter
+from surgsim.tick.status import GOES_ON
 
-Array = NDArray[np.float64]
 OPERATOR_COLUMNS = (
     scalar("tank_operator", "j"),
     scalar("tank_operator_overflow", "j"),
@@ -48,149 +45,197 @@ OPERATOR_COLUMNS = (
 )
 
 
-class OperatorSideConfig(PartConfig):
-    """The operator's side.
+class OperatorSideLaw(Record):
+    """Numbers of the operator's side.
 
-    `stiffness_n_per_m` is K_v of the force law, per metre of handle motion. With a tank below its target a
-    damper of `refill_damping_ns_per_mj` times the shortage refills it from the operator's motion, as the
-    tank-level controller of Franken et al., IEEE Trans. Robot. 27(4), 2011; 0 turns that off.
+    Attributes:
+        passivity: TANK, TDPA or OFF.
+        period_s: Control period [s].
+        stiffness_n_per_m: K_v of the force law, per metre of handle motion.
+        refill_damping_ns_per_mj: Damper on the handle per joule that its tank lacks.
+        entry: What enters the hand in Python, see `surgsim.tick.python_part` (1,).
+        start_tip: The tip until something is received (3,) [m].
+        console: The console.
+        operator: The simulated operator, and the mapping between console and world.
+        receiver: Of what comes from the remote side.
+        tank: The energy tank.
+        control: The passivity controller.
     """
 
-    stiffness_n_per_m: NonNegativeFloat = 60.0
-    refill_damping_ns_per_mj: NonNegativeFloat = 20.0
-    passivity: PassivityMode = "tank"
-    mapping: MappingConfig = MappingConfig()
-    console: ConsoleConfig = ConsoleConfig()
-    operator: OperatorConfig = OperatorConfig()
-    receiver: ReceiverConfig = ReceiverConfig()
-    tank: tanks.TankConfig = tanks.TankConfig()
-    control: passivity_control.PassivityControlConfig = passivity_control.PassivityControlConfig()
+    SHAPES: ClassVar[dict[str, str]] = {"entry": "1", "start_tip": "3"}
+    passivity: int
+    period_s: float
+    stiffness_n_per_m: float
+    refill_damping_ns_per_mj: float
+    entry: Array
+    start_tip: Array
+    console: ConsoleLaw
+    operator: OperatorLaw
+    receiver: ReceiverLaw
+    tank: TankLaw
+    control: PassivityLaw
 
 
-@dataclass(frozen=True, kw_only=True, slots=True)
-class OperatorOutput:
-    """What one tick sends: the message and the energy that goes with it, and what the hand did."""
+class OperatorSide(Record):
+    """State of the operator's side.
 
-    message: OperatorMessage
-    energy_j: float
-    hand: HandCommand
+    Attributes:
+        in_python: Whether the hand is a Python part.
+        t_s: Time [s].
+        scale: Share of the force that the tank can pay for.
+        tip: The tip as it is known (3,) [m].
+        wrench: What the motors are to render, force and zeros (6,) [N, N m].
+        desired: Force before the tank or the passivity controller (3,) [N].
+        path: Motion of the handle over the period (3,) [m].
+        content: The message (7,).
+        console: The console.
+        hand: What the hand does.
+        operator: The simulated operator.
+        receiver: Of what comes from the remote side.
+        tank: The energy tank.
+        port: The passivity observer.
+    """
+
+    SHAPES: ClassVar[dict[str, str]] = {
+        "wrench": "6",
+        "content": str(CONTENT),
+        **{name: "3" for name in ("tip", "desired", "path")},
+    }
+    in_python: int
+    t_s: float
+    scale: float
+    tip: Array
+    wrench: Array
+    desired: Array
+    path: Array
+    content: Array
+    console: ConsoleMemory
+    hand: HandAction
+    operator: Operator
+    receiver: Receiver
+    tank: Tank
+    port: PortEnergy
 
 
-class OperatorSide:
-    """One tick: receive, law, passivity, hand, console, tank, send."""
+@compiled
+def receive_at_operator(
+    law: OperatorSideLaw, side: OperatorSide, line: ChannelLaw, channel: Channel, memory: Array
+) -> float:
+    """Take what has arrived, and find the force of the law; the energy that came with it [J]."""
+    received = receive(law.receiver, side.receiver, line, channel, memory, side.t_s)
+    known = side.receiver.highest >= 0
+    for i in range(3):
+        side.tip[i] = side.receiver.content[POSITION + i] if known else law.start_tip[i]
+    handle = side.console.state
+    feedback_force(law.operator.mapping, handle.position, side.tip, law.stiffness_n_per_m, side.desired)
+    renderable(law.console, side.console, side.desired)
+    return received
 
-    def __init__(
-        self,
-        config: OperatorSideConfig,
-        goals: tuple[Goal, ...],
-        start_tip: ArrayLike,
-        energy: EnergyMode,
-        seed: np.random.SeedSequence,
-        hand: Hand | None = None,
-        period_s: float = 0.001,
-    ) -> None:
-        """Put console and tip in correspondence; `hand` takes the simulated operator's place."""
-        self.config = config
-        self.console = Console(config.console, period_s)
-        self.period_s = period_s
-        self._state = self.console.state()
-        self._start_tip = np.array(start_tip, dtype=float)
-        self.mapping = Mapping.aligned(config.mapping, self._state.position, self._start_tip)
-        self.holder: Hand = hand or Operator(config.operator, goals, self.mapping, self.period_s, seed)
-        self.receiver: Receiver[RemoteMessage] = Receiver(config.receiver, energy)
-        self.tank = tanks.start(config.tank)
-        self.port = passivity_control.PortState()
-        self._force, self._scale = np.zeros(3), 1.0
-        self._hand: HandCommand | None = None
 
-    def step(self, t_s: float, packets: Iterable[Packet[RemoteMessage]]) -> OperatorOutput:
-        """Advance from `t_s` by one control period, with the packets that have arrived by `t_s`."""
-        received = self.receiver.accept(t_s, packets)
-        newest = self.receiver.newest
-        tip = self._start_tip if newest is None else newest.content.position
-        spring = feedback_force(self.mapping, self._state.position, tip, self.config.stiffness_n_per_m)
-        desired = self.console.renderable(spring)
-        self._force = self._passive(desired)
-        self._hand = self.holder.step(t_s, tip, self._state)
-        rendered = self._move_console(self._hand)
-        energy = self._settle(desired, rendered, received)
-        state = self._state
-        message = OperatorMessage(
-            position=self.mapping.to_remote(state.position),
-            velocity=self.mapping.motion_to_remote(state.velocity),
-            jaw=self._hand.jaw,
-        )
-        return OperatorOutput(message=message, energy_j=energy, hand=self._hand)
+@compiled
+def make_passive(law: OperatorSideLaw, side: OperatorSide) -> None:
+    """Force that the tank can pay for, or that the passivity controller lets through.
 
-    def signals(self) -> tuple[float, ...]:
-        """Values of `OPERATOR_COLUMNS` after the last step, SI units by their suffix."""
-        account, level, state, hand = self.console.energy(), self.tank, self._state, self._hand
-        return (
-            level.level_j,
-            level.overflow_j,
-            level.deficit_j,
-            level.sent_j,
-            self.receiver.received_j,
-            self.port.observed_j,
-            account.rendered_j,
-            account.hand_j,
-            account.kinetic_j,
-            account.potential_j,
-            account.motor_j,
-            account.damping_j,
-            account.friction_j,
-            account.residual_j,
-            self._scale,
-            *state.position.tolist(),
-            *state.velocity.tolist(),
-            *self._force.tolist(),
-            *(hand.wrench[:3].tolist() if hand else (math.nan,) * 3),
-            *(hand.intended.tolist() if hand else (math.nan,) * 3),
-            hand.jaw if hand else 0.0,
-            float(hand.goal) if hand else 0.0,
-            float(hand.missed) if hand else 0.0,
-            float(hand.done) if hand else 0.0,
-        )
+    With a tank below its target a damper of `refill_damping_ns_per_mj` times the shortage refills it from the
+    operator's motion, as the tank-level controller of Franken et al., IEEE Trans. Robot. 27(4), 2011.
+    """
+    force, velocity = side.wrench[:3], side.console.state.velocity
+    for i in range(3):
+        force[i] = side.desired[i]
+    if law.passivity == OFF:
+        return
+    if law.passivity == TDPA:
+        impedance_control(law.control, side.port, force, velocity, law.period_s, force)
+        renderable(law.console, side.console, force)
+        return
+    shortage = max(law.tank.target_j - level(side.tank), 0.0)
+    if shortage > 0.0:
+        for i in range(3):
+            force[i] -= law.refill_damping_ns_per_mj * shortage * velocity[i]
+        renderable(law.console, side.console, force)
+    work = law.period_s * dot(force, velocity)
+    own = 0.5 * (law.period_s * law.period_s) * dot(force, force) / law.console.least_mass_kg
+    side.scale = affordable(work, own, level(side.tank) - law.tank.floor_j)
+    for i in range(3):
+        force[i] = side.scale * force[i]
 
-    def _passive(self, force: Array) -> Array:
-        """Force that the tank can pay for, or that the passivity controller lets through."""
-        config, velocity = self.config, self._state.velocity
-        if config.passivity == "off":
-            return force
-        if config.passivity == "tdpa":
-            damped = passivity_control.impedance_control(
-                self.port, force, velocity, self.period_s, config.control
-            )
-            return self.console.renderable(damped)
-        shortage = max(config.tank.target_j - self.tank.level_j, 0.0)
-        braked = force
-        if shortage > 0.0:
-            brake = config.refill_damping_ns_per_mj * shortage * velocity
-            braked = self.console.renderable(force - brake)
-        work = self.period_s * float(braked @ velocity)
-        own = 0.5 * self.period_s**2 * float(braked @ braked) / config.console.least_mass_kg
-        self._scale = tanks.affordable(work, own, self.tank.level_j - config.tank.floor_j)
-        return self._scale * braked
 
-    def _move_console(self, hand: HandCommand) -> float:
-        """Step the console; returns the work of the rendered force [J]."""
-        before = self.console.rendered_j
-        wrench = np.zeros(6)
-        wrench[:3] = self._force
-        self._path = self._state.position
-        self._state = self.console.step(wrench, hand.wrench)
-        self._path = self._state.position - self._path
-        return self.console.rendered_j - before
+@compiled
+def _move_console(law: OperatorSideLaw, side: OperatorSide) -> float:
+    """Step the console; the work of the rendered force [J]."""
+    before, handle = side.console.account.rendered_j, side.console.state
+    for i in range(3):
+        side.path[i] = -handle.position[i]
+    step_console(law.console, side.console, side.wrench, side.hand.wrench)
+    for i in range(3):
+        side.path[i] += handle.position[i]
+    return side.console.account.rendered_j - before
 
-    def _settle(self, desired: Array, rendered_j: float, received_j: float) -> float:
-        """Book the tick; returns the energy to send [J]."""
-        config = self.config
-        if config.passivity == "off":
-            return 0.0
-        if config.passivity == "tdpa":
-            work = float(desired @ self._path)
-            self.port = passivity_control.observe(self.port, work, work - rendered_j, received_j)
-            return max(-work, 0.0)
-        self.tank = tanks.exchange(self.tank, config.tank, rendered_j, received_j)
-        self.tank, energy = tanks.send_surplus(self.tank, config.tank, self.period_s)
-        return energy
+
+@compiled
+def _settle(law: OperatorSideLaw, side: OperatorSide, rendered_j: float, received_j: float) -> float:
+    """Book the tick; the energy to send [J]."""
+    if law.passivity == OFF:
+        return 0.0
+    if law.passivity == TDPA:
+        work = dot(side.desired, side.path)
+        observe(side.port, work, work - rendered_j, received_j)
+        return max(-work, 0.0)
+    exchange(law.tank, side.tank, rendered_j, received_j)
+    return send_surplus(law.tank, side.tank, law.period_s)
+
+
+@compiled
+def step_operator_side(
+    law: OperatorSideLaw,
+    gains: Array,
+    side: OperatorSide,
+    line: ChannelLaw,
+    channel: Channel,
+    memory: Array,
+) -> tuple[int, float]:
+    """Receive, law, passivity, hand, console, tank: one control period from `side.t_s`.
+
+    Args:
+        law: Numbers of the side.
+        gains: All numbers, among them the goals.
+        side: Its state; the message to be sent is in `side.content` afterwards.
+        line: Numbers of the channel from the remote side.
+        channel: The channel.
+        memory: All memory, among it packets and random draws.
+
+    Returns:
+        A status, and the energy to be sent [J].
+    """
+    received = receive_at_operator(law, side, line, channel, memory)
+    make_passive(law, side)
+    status = GOES_ON
+    if side.in_python:
+        status = enter(law.entry)
+    else:
+        operate(law.operator, gains, side.operator, memory, side.t_s, side.tip, side.console.state, side.hand)
+    if status != GOES_ON:
+        return status, 0.0
+    rendered = _move_console(law, side)
+    energy = _settle(law, side, rendered, received)
+    handle = side.console.state
+    to_remote(law.operator.mapping, handle.position, side.content[POSITION : POSITION + 3])
+    motion_to_remote(law.operator.mapping, handle.velocity, side.content[VELOCITY : VELOCITY + 3])
+    side.content[JAW] = side.hand.jaw
+    return status, energy
+
+
+@compiled
+def fill_operator_columns(side: OperatorSide, out: Array) -> None:
+    """Values of `OPERATOR_COLUMNS`, SI units by their suffix."""
+    account, tank, hand, handle = side.console.account, side.tank, side.hand, side.console.state
+    out[0], out[1], out[2], out[3] = level(tank), tank.overflow_j, tank.deficit_j, tank.sent_j
+    out[4], out[5] = side.receiver.received_j, observed(side.port)
+    out[6], out[7] = account.rendered_j, account.hand_j
+    out[8], out[9], out[10] = account.kinetic_j, account.potential_j, account.motor_j
+    out[11], out[12], out[13] = account.damping_j, account.friction_j, account.residual_j
+    out[14] = side.scale
+    for i in range(3):
+        out[15 + i], out[18 + i] = handle.position[i], handle.velocity[i]
+        out[21 + i], out[24 + i], out[27 + i] = side.wrench[i], hand.wrench[i], hand.intended[i]
+    out[30], out[31], out[32], out[33] = hand.jaw, hand.goal, hand.missed, hand.done

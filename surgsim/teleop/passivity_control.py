@@ -1,14 +1,11 @@
 """Time-domain passivity control of a two-port with delay: a comparison for the energy tanks."""
 
-from dataclasses import dataclass
-
-import numpy as np
-from numpy.typing import NDArray
 from pydantic import PositiveFloat
 
 from surgsim.catalog import PartConfig
-
-Array = NDArray[np.float64]
+from surgsim.compiled import compiled
+from surgsim.tick.algebra import dot
+from surgsim.tick.arrays import Array, Record
 
 
 class PassivityControlConfig(PartConfig):
@@ -22,8 +19,14 @@ class PassivityControlConfig(PartConfig):
     mobility_limit_m_per_ns: PositiveFloat = 0.05
 
 
-@dataclass(frozen=True, kw_only=True, slots=True)
-class PortState:
+class PassivityLaw(Record):
+    """Limits, as in `PassivityControlConfig`."""
+
+    damping_limit_ns_per_m: float
+    mobility_limit_m_per_ns: float
+
+
+class PortEnergy(Record):
     """Energies at one port of the channel [J].
 
     Attributes:
@@ -33,74 +36,81 @@ class PortState:
         dissipated_j: Ever burnt by this side's controller.
     """
 
-    in_j: float = 0.0
-    out_j: float = 0.0
-    received_j: float = 0.0
-    dissipated_j: float = 0.0
-
-    @property
-    def observed_j(self) -> float:
-        """Passivity observer W = E_in(other side, delayed) + dissipated - E_out; negative is active."""
-        return self.received_j + self.dissipated_j - self.out_j
+    in_j: float
+    out_j: float
+    received_j: float
+    dissipated_j: float
 
 
-def observe(state: PortState, work_j: float, dissipated_j: float, received_j: float) -> PortState:
+@compiled
+def observed(port: PortEnergy) -> float:
+    """Passivity observer W = E_in(other side, delayed) + dissipated - E_out [J]; negative is active."""
+    return port.received_j + port.dissipated_j - port.out_j
+
+
+@compiled
+def observe(port: PortEnergy, work_j: float, dissipated_j: float, received_j: float) -> None:
     """Add one period; `work_j` is what left the channel before the controller, negative what entered."""
-    return PortState(
-        in_j=state.in_j + max(-work_j, 0.0),
-        out_j=state.out_j + max(work_j, 0.0),
-        received_j=state.received_j + received_j,
-        dissipated_j=state.dissipated_j + dissipated_j,
-    )
+    port.in_j += max(-work_j, 0.0)
+    port.out_j += max(work_j, 0.0)
+    port.received_j += received_j
+    port.dissipated_j += dissipated_j
 
 
-def _gain(state: PortState, flow: Array, power_w: float, period_s: float, limit: float) -> float:
+@compiled
+def _gain(port: PortEnergy, flow: Array, power_w: float, period_s: float, limit: float) -> float:
     """Smallest gain with W + T_s gain |flow|^2 >= 0 after this period, within its limit."""
-    debt = max(power_w, 0.0) * period_s - state.observed_j
-    square = float(flow @ flow) * period_s
+    debt = max(power_w, 0.0) * period_s - observed(port)
+    square = dot(flow, flow) * period_s
     if debt <= 0.0 or square <= 0.0:
         return 0.0
     return limit if debt >= limit * square else debt / square
 
 
+@compiled
 def impedance_control(
-    state: PortState, force: Array, velocity: Array, period_s: float, config: PassivityControlConfig
-) -> Array:
+    law: PassivityLaw, port: PortEnergy, force: Array, velocity: Array, period_s: float, out: Array
+) -> None:
     """Force on the handle with the passivity controller's damper: F - beta v.
 
     beta = -W / (T_s |v|^2) if the observer would turn negative, else 0.
 
     Args:
-        state: Observer of this side.
+        law: Limits.
+        port: Observer of this side.
         force: Force on the handle before the controller (3,) [N].
         velocity: Handle velocity (3,) [m/s].
         period_s: Control period T_s.
-        config: Limits.
+        out: Filled with the force (3,) [N]; may be `force`.
 
     Source:
         Hannaford, Ryu, IEEE Trans. Robot. Autom. 18(1), 2002; with delay: Ryu, Artigas, Preusche,
         Mechatronics 20(7), 2010.
     """
-    power = float(force @ velocity)
-    return force - _gain(state, velocity, power, period_s, config.damping_limit_ns_per_m) * velocity
+    beta = _gain(port, velocity, dot(force, velocity), period_s, law.damping_limit_ns_per_m)
+    for i in range(3):
+        out[i] = force[i] - beta * velocity[i]
 
 
+@compiled
 def admittance_control(
-    state: PortState, velocity: Array, force: Array, period_s: float, config: PassivityControlConfig
-) -> Array:
+    law: PassivityLaw, port: PortEnergy, velocity: Array, force: Array, period_s: float, out: Array
+) -> None:
     """Velocity command of the remote arm with the passivity controller: v - alpha f.
 
     alpha = -W / (T_s |f|^2) if the observer would turn negative, else 0.
 
     Args:
-        state: Observer of this side.
+        law: Limits.
+        port: Observer of this side.
         velocity: Commanded velocity before the controller (3,) [m/s].
         force: Force of the tip on its environment (3,) [N].
         period_s: Control period T_s.
-        config: Limits.
+        out: Filled with the velocity (3,) [m/s]; may be `velocity`.
 
     Source:
         As `impedance_control`.
     """
-    power = float(force @ velocity)
-    return velocity - _gain(state, force, power, period_s, config.mobility_limit_m_per_ns) * force
+    alpha = _gain(port, force, dot(force, velocity), period_s, law.mobility_limit_m_per_ns)
+    for i in range(3):
+        out[i] = velocity[i] - alpha * force[i]

@@ -1,15 +1,16 @@
 """One reaching movement: minimum jerk, duration by Fitts' law, scatter growing with speed."""
 
 import math
-from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import NonNegativeFloat, PositiveFloat
 
 from surgsim.catalog import PartConfig
+from surgsim.compiled import compiled
+from surgsim.tick.algebra import norm
+from surgsim.tick.arrays import Array, Record
 
-Array = NDArray[np.float64]
 _PEAK = 1.875  # peak over mean speed of a minimum-jerk movement
 
 
@@ -30,58 +31,72 @@ class ReachConfig(PartConfig):
     scatter_floor_m: NonNegativeFloat = 1e-4
 
 
-def movement_time(distance_m: float, width_m: float, config: ReachConfig) -> float:
-    """Duration of a movement over `distance_m` to a target of width `width_m` [s]."""
-    fitts = config.fitts_a_s + config.fitts_b_s * math.log2(max(2.0 * distance_m / width_m, 1.0))
-    return max(fitts, config.shortest_s, _PEAK * distance_m / config.speed_limit_m_per_s)
+class ReachLaw(Record):
+    """Numbers of reaching, as in `ReachConfig`."""
+
+    fitts_a_s: float
+    fitts_b_s: float
+    shortest_s: float
+    speed_limit_m_per_s: float
+    scatter_s: float
+    scatter_floor_m: float
 
 
-def scatter(distance_m: float, duration_s: float, config: ReachConfig) -> float:
-    """Standard deviation of the end point per axis [m]."""
-    return config.scatter_s * distance_m / duration_s + config.scatter_floor_m
-
-
-@dataclass(frozen=True, kw_only=True, slots=True)
-class Reach:
-    """Minimum-jerk movement (Flash, Hogan, J. Neurosci. 5(7), 1985).
-
-    p(t) = p0 + (p1 - p0) (10 u^3 - 15 u^4 + 6 u^5), u = (t - start) / duration in [0, 1].
+class Reach(Record):
+    """A minimum-jerk movement.
 
     Attributes:
-        start_s: When it begins.
-        duration_s: How long it lasts.
+        start_s: When it begins [s].
+        duration_s: How long it lasts [s].
         origin: p0 (3,) [m].
         change: p1 - p0 (3,) [m].
     """
 
+    SHAPES: ClassVar[dict[str, str]] = {"origin": "3", "change": "3"}
     start_s: float
     duration_s: float
     origin: Array
     change: Array
 
-    @property
-    def end_s(self) -> float:
-        """When it ends."""
-        return self.start_s + self.duration_s
 
-    def at(self, t_s: float) -> tuple[Array, Array]:
-        """Position (3,) [m] and velocity (3,) [m/s]."""
-        u = min(max((t_s - self.start_s) / self.duration_s, 0.0), 1.0)
-        s = u * u * u * (10.0 + u * (-15.0 + 6.0 * u))
-        ds = 30.0 * u * u * (1.0 - u) ** 2 / self.duration_s
-        return self.origin + s * self.change, ds * self.change
+@compiled
+def movement_time(law: ReachLaw, distance_m: float, width_m: float) -> float:
+    """Duration of a movement over `distance_m` to a target of width `width_m` [s]."""
+    fitts = law.fitts_a_s + law.fitts_b_s * math.log2(max(2.0 * distance_m / width_m, 1.0))
+    return max(fitts, law.shortest_s, _PEAK * distance_m / law.speed_limit_m_per_s)
 
 
-def aim(
-    origin: Array,
-    target: Array,
-    width_m: float,
-    start_s: float,
-    config: ReachConfig,
-    rng: np.random.Generator,
-) -> Reach:
-    """Plan a movement from `origin` to `target` (3,) [m], with its scatter drawn from `rng`."""
-    distance = float(np.linalg.norm(target - origin))
-    duration = movement_time(distance, width_m, config)
-    error = scatter(distance, duration, config) * rng.standard_normal(3)
-    return Reach(start_s=start_s, duration_s=duration, origin=origin, change=target - origin + error)
+@compiled
+def scatter(law: ReachLaw, distance_m: float, duration_s: float) -> float:
+    """Standard deviation of the end point per axis [m]."""
+    return law.scatter_s * distance_m / duration_s + law.scatter_floor_m
+
+
+@compiled
+def reach_at(reach: Reach, t_s: float, position: Array, velocity: Array) -> None:
+    """Position (3,) [m] and velocity (3,) [m/s] at `t_s`.
+
+    p(t) = p0 + (p1 - p0) (10 u^3 - 15 u^4 + 6 u^5), u = (t - start) / duration in [0, 1].
+
+    Source:
+        Flash, Hogan, J. Neurosci. 5(7), 1985.
+    """
+    u = min(max((t_s - reach.start_s) / reach.duration_s, 0.0), 1.0)
+    s = u * u * u * (10.0 + u * (-15.0 + 6.0 * u))
+    ds = 30.0 * u * u * ((1.0 - u) * (1.0 - u)) / reach.duration_s
+    for i in range(3):
+        position[i], velocity[i] = reach.origin[i] + s * reach.change[i], ds * reach.change[i]
+
+
+@compiled
+def aim(law: ReachLaw, reach: Reach, target: Array, width_m: float, start_s: float, noise: Array) -> None:
+    """Plan a movement from the origin that `reach` has to `target` (3,) [m], scattered by `noise`, normal."""
+    way = np.empty(3)
+    for i in range(3):
+        way[i] = target[i] - reach.origin[i]
+    distance = norm(way)
+    duration = movement_time(law, distance, width_m)
+    spread = scatter(law, distance, duration)
+    reach.start_s, reach.duration_s = start_s, duration
+    for i in range(3):
+        reach.change[i] = way[i] + spread * noise[i]

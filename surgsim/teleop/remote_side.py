@@ -1,22 +1,18 @@
 """The remote side: set points for the arm, its energy budget, tank or passivity controller."""
 
 import math
-from collections.abc import Iterable
-from dataclasses import dataclass
+from typing import ClassVar
 
-import numpy as np
-from numpy.typing import ArrayLike, NDArray
-from pydantic import NonNegativeFloat, PositiveFloat
-
-from surgsim.catalog import PartConfig
 from surgsim.columns import scalar, vector
-from surgsim.teleop import passivity_control
-from surgsim.teleop import tank as tanks
-from surgsim.teleop.channel import EnergyMode, Packet
-from surgsim.teleop.messages import OperatorMessage, PassivityMode, RemoteMessage
-from surgsim.teleop.receiver import Receiver, ReceiverConfig
+from surgsim.compiled import compiled
+from surgsim.teleop.channel import Channel, ChannelLaw
+from surgsim.teleop.messages import JAW, OFF, POSITION, TANK, TDPA, VELOCITY
+from surgsim.teleop.passivity_control import PassivityLaw, PortEnergy, admittance_control, observe, observed
+from surgsim.teleop.receiver import Receiver, ReceiverLaw, receive, trust
+from surgsim.teleop.tank import Tank, TankLaw, budget, exchange, level, send_surplus
+from surgsim.tick.algebra import dot, norm
+from surgsim.tick.arrays import Array, Record
 
-Array = NDArray[np.float64]
 REMOTE_COLUMNS = (
     scalar("tank_remote", "j"),
     scalar("tank_remote_overflow", "j"),
@@ -34,139 +30,137 @@ REMOTE_COLUMNS = (
 )
 
 
-class RemoteSideConfig(PartConfig):
-    """The remote side.
-
-    v_d = trust (v + drift_gain (x - x_r)), with the master's velocity v and position x as received: the
-    second term keeps lost packets from adding up to an offset, and is cut at `drift_speed_m_per_s`. With
-    drift_gain 0 the command is the paper's pure velocity.
-    """
-
-    drift_gain_per_s: NonNegativeFloat = 2.0
-    drift_speed_m_per_s: PositiveFloat = 0.02
-    passivity: PassivityMode = "tank"
-    receiver: ReceiverConfig = ReceiverConfig()
-    tank: tanks.TankConfig = tanks.TankConfig()
-    control: passivity_control.PassivityControlConfig = passivity_control.PassivityControlConfig()
-
-
-@dataclass(frozen=True, kw_only=True, slots=True)
-class RemoteMeasurement:
-    """What the remote arm measured over the last control period.
+class RemoteSideLaw(Record):
+    """Numbers of the remote side.
 
     Attributes:
+        passivity: TANK, TDPA or OFF.
+        period_s: Control period [s].
+        drift_gain_per_s: Pull of the tip to the master's position beside its velocity.
+        drift_speed_m_per_s: Limit of that pull.
+        receiver: Of what comes from the operator's side.
+        tank: The energy tank.
+        control: The passivity controller.
+    """
+
+    passivity: int
+    period_s: float
+    drift_gain_per_s: float
+    drift_speed_m_per_s: float
+    receiver: ReceiverLaw
+    tank: TankLaw
+    control: PassivityLaw
+
+
+class RemoteSide(Record):
+    """State of the remote side.
+
+    Attributes:
+        environment_j: Energy that the tip gave to its environment [J].
+        trust: In the set point, from 0 to 1.
+        jaw: How far the jaws close.
+        budget_j: Right side of the passivity row, T - epsilon [J]; infinite without a tank.
+        wanted: Velocity before the passivity controller (3,) [m/s].
+        velocity: v_d (3,) [m/s].
+        receiver: Of what comes from the operator's side.
+        tank: The energy tank.
+        port: The passivity observer.
+    """
+
+    SHAPES: ClassVar[dict[str, str]] = {"wanted": "3", "velocity": "3"}
+    environment_j: float
+    trust: float
+    jaw: float
+    budget_j: float
+    wanted: Array
+    velocity: Array
+    receiver: Receiver
+    tank: Tank
+    port: PortEnergy
+
+
+@compiled
+def _settle(law: RemoteSideLaw, side: RemoteSide, force: Array, work_j: float, received_j: float) -> float:
+    """Book the last period; the energy to send [J]."""
+    if law.passivity == OFF:
+        return 0.0
+    if law.passivity == TDPA:
+        work = law.period_s * dot(force, side.wanted)
+        burnt = work - law.period_s * dot(force, side.velocity)
+        observe(side.port, work, burnt, received_j)
+        return max(-work, 0.0)
+    exchange(law.tank, side.tank, work_j, received_j)
+    return send_surplus(law.tank, side.tank, law.period_s)
+
+
+@compiled
+def _set_point(law: RemoteSideLaw, side: RemoteSide, position: Array, t_s: float) -> None:
+    """v_d = trust (v + drift_gain (x - x_r)), with the master's velocity v and position x as received.
+
+    The second term keeps lost packets from adding up to an offset, and is cut at `drift_speed_m_per_s`. With
+    drift_gain 0 the command is the paper's pure velocity.
+    """
+    side.trust = trust(law.receiver, side.receiver, t_s)
+    if side.receiver.highest < 0:
+        return
+    order, drift = side.receiver.content, side.wanted
+    side.jaw = order[JAW]
+    for i in range(3):
+        drift[i] = law.drift_gain_per_s * (order[POSITION + i] - position[i])
+    speed = norm(drift)
+    cut = law.drift_speed_m_per_s / speed if speed > law.drift_speed_m_per_s else 1.0
+    for i in range(3):
+        side.wanted[i] = side.trust * (order[VELOCITY + i] + cut * drift[i])
+
+
+@compiled
+def step_remote_side(
+    law: RemoteSideLaw,
+    side: RemoteSide,
+    line: ChannelLaw,
+    channel: Channel,
+    memory: Array,
+    t_s: float,
+    position: Array,
+    force: Array,
+    work_j: float,
+) -> float:
+    """Receive, book the environment's work, set point: the command for the period from `t_s`.
+
+    Args:
+        law: Numbers of the side.
+        side: Its state, with the command in it afterwards.
+        line: Numbers of the channel from the operator's side.
+        channel: The channel.
+        memory: All memory, among it packets.
+        t_s: Time [s].
         position: Tip position now (3,) [m].
         force: Force of the tip on its environment now (3,) [N].
         work_j: Energy that the tip gave to its environment in the last period; negative if it absorbed some.
+
+    Returns:
+        The energy to be sent [J].
     """
-
-    position: Array
-    force: Array
-    work_j: float
-
-
-@dataclass(frozen=True, kw_only=True, slots=True)
-class RemoteOutput:
-    """What one tick commands and sends.
-
-    Attributes:
-        velocity: Desired tip velocity v_d (3,) [m/s].
-        jaw: Closing of the jaws, 0 to 1.
-        budget_j: Right side of the passivity row, T - epsilon [J]; infinite without a tank.
-        message: For the operator's side.
-        energy_j: Energy to send with it [J].
-    """
-
-    velocity: Array
-    jaw: float
-    budget_j: float
-    message: RemoteMessage
-    energy_j: float
+    received = receive(law.receiver, side.receiver, line, channel, memory, t_s)
+    side.environment_j += work_j
+    energy = _settle(law, side, force, work_j, received)
+    _set_point(law, side, position, t_s)
+    for i in range(3):
+        side.velocity[i] = side.wanted[i]
+    if law.passivity == TDPA:
+        admittance_control(law.control, side.port, side.wanted, force, law.period_s, side.velocity)
+    side.budget_j = budget(law.tank, side.tank) if law.passivity == TANK else math.inf
+    return energy
 
 
-class RemoteSide:
-    """One tick: receive, book the environment's work, set point, send."""
-
-    def __init__(
-        self, config: RemoteSideConfig, start_tip: ArrayLike, energy: EnergyMode, period_s: float
-    ) -> None:
-        self.config = config
-        self.period_s = period_s
-        self._start_tip = np.array(start_tip, dtype=float)
-        self.receiver: Receiver[OperatorMessage] = Receiver(config.receiver, energy)
-        self.tank = tanks.start(config.tank)
-        self.port = passivity_control.PortState()
-        self.environment_j = 0.0
-        self._wanted, self._velocity = np.zeros(3), np.zeros(3)
-        self._jaw, self._trust = 0.0, 0.0
-
-    def step(
-        self, t_s: float, packets: Iterable[Packet[OperatorMessage]], measured: RemoteMeasurement
-    ) -> RemoteOutput:
-        """Command for the period from `t_s`, with the packets that have arrived by `t_s`."""
-        received = self.receiver.accept(t_s, packets)
-        self.environment_j += measured.work_j
-        energy = self._settle(measured, received)
-        self._wanted = self._set_point(t_s, measured)
-        self._velocity = self._passive(self._wanted, measured.force)
-        return RemoteOutput(
-            velocity=self._velocity,
-            jaw=self._jaw,
-            budget_j=self._budget(),
-            message=RemoteMessage(position=measured.position, force=measured.force),
-            energy_j=energy,
-        )
-
-    def signals(self) -> tuple[float, ...]:
-        """Values of `REMOTE_COLUMNS` after the last step, SI units by their suffix."""
-        level = self.tank
-        return (
-            level.level_j,
-            level.overflow_j,
-            level.deficit_j,
-            level.sent_j,
-            self.receiver.received_j,
-            self.port.observed_j,
-            self._budget(),
-            self.environment_j,
-            self._trust,
-            float(self.receiver.late_packets),
-            float(self.receiver.duplicate_packets),
-            *self._velocity.tolist(),
-            self._jaw,
-        )
-
-    def _set_point(self, t_s: float, measured: RemoteMeasurement) -> Array:
-        newest, self._trust = self.receiver.newest, self.receiver.trust(t_s)
-        if newest is None:
-            return np.zeros(3)
-        order = newest.content
-        self._jaw = order.jaw
-        drift = self.config.drift_gain_per_s * (order.position - measured.position)
-        speed, limit = math.sqrt(float(drift @ drift)), self.config.drift_speed_m_per_s
-        if speed > limit:
-            drift = drift * (limit / speed)
-        return np.asarray(self._trust * (order.velocity + drift))
-
-    def _passive(self, velocity: Array, force: Array) -> Array:
-        if self.config.passivity != "tdpa":
-            return velocity
-        return passivity_control.admittance_control(
-            self.port, velocity, force, self.period_s, self.config.control
-        )
-
-    def _budget(self) -> float:
-        return tanks.budget(self.tank, self.config.tank) if self.config.passivity == "tank" else math.inf
-
-    def _settle(self, measured: RemoteMeasurement, received_j: float) -> float:
-        """Book the last period; returns the energy to send [J]."""
-        if self.config.passivity == "off":
-            return 0.0
-        if self.config.passivity == "tdpa":
-            work = self.period_s * float(measured.force @ self._wanted)
-            burnt = work - self.period_s * float(measured.force @ self._velocity)
-            self.port = passivity_control.observe(self.port, work, burnt, received_j)
-            return max(-work, 0.0)
-        self.tank = tanks.exchange(self.tank, self.config.tank, measured.work_j, received_j)
-        self.tank, energy = tanks.send_surplus(self.tank, self.config.tank, self.period_s)
-        return energy
+@compiled
+def fill_remote_columns(side: RemoteSide, out: Array) -> None:
+    """Values of `REMOTE_COLUMNS`, SI units by their suffix."""
+    tank, receiver = side.tank, side.receiver
+    out[0], out[1], out[2], out[3] = level(tank), tank.overflow_j, tank.deficit_j, tank.sent_j
+    out[4], out[5], out[6] = receiver.received_j, observed(side.port), side.budget_j
+    out[7], out[8] = side.environment_j, side.trust
+    out[9], out[10] = receiver.late_packets, receiver.duplicate_packets
+    for i in range(3):
+        out[11 + i] = side.velocity[i]
+    out[14] = side.jaw

@@ -1,12 +1,13 @@
 """Energy tank: the account from which a side pays for what its controller gives away."""
 
 import math
-from dataclasses import dataclass
 from typing import Self
 
 from pydantic import NonNegativeFloat, PositiveFloat, model_validator
 
 from surgsim.catalog import PartConfig
+from surgsim.compiled import compiled
+from surgsim.tick.arrays import Record
 
 
 class TankConfig(PartConfig):
@@ -33,8 +34,18 @@ class TankConfig(PartConfig):
         return self
 
 
-@dataclass(frozen=True, kw_only=True, slots=True)
-class TankState:
+class TankLaw(Record):
+    """Numbers of a tank, as in `TankConfig`."""
+
+    initial_j: float
+    floor_j: float
+    target_j: float
+    capacity_j: float
+    send_time_s: float
+    send_limit_w: float
+
+
+class Tank(Record):
     """State of a tank.
 
     Attributes:
@@ -45,65 +56,63 @@ class TankState:
     """
 
     x: float
-    sent_j: float = 0.0
-    overflow_j: float = 0.0
-    deficit_j: float = 0.0
-
-    @property
-    def level_j(self) -> float:
-        """T = x^2 / 2."""
-        return 0.5 * self.x * self.x
+    sent_j: float
+    overflow_j: float
+    deficit_j: float
 
 
-def start(config: TankConfig) -> TankState:
-    """The tank at its initial level."""
-    return TankState(x=math.sqrt(2.0 * config.initial_j))
+@compiled
+def level(tank: Tank) -> float:
+    """T = x^2 / 2 [J]."""
+    return 0.5 * tank.x * tank.x
 
 
-def budget(state: TankState, config: TankConfig) -> float:
+@compiled
+def fill_tank(law: TankLaw, tank: Tank) -> None:
+    """Bring a new tank to its initial level."""
+    tank.x = math.sqrt(2.0 * law.initial_j)
+
+
+@compiled
+def budget(law: TankLaw, tank: Tank) -> float:
     """What may be taken in this period: max(T - epsilon, 0) [J]."""
-    return max(state.level_j - config.floor_j, 0.0)
+    return max(level(tank) - law.floor_j, 0.0)
 
 
-def exchange(state: TankState, config: TankConfig, work_j: float, received_j: float) -> TankState:
-    """The tank after one period.
+@compiled
+def exchange(law: TankLaw, tank: Tank, work_j: float, received_j: float) -> None:
+    """One period of the tank.
 
     T+ = T - W + E_in, cut at the capacity (overflow) and at zero (deficit).
 
     Args:
-        state: Before.
-        config: Bounds.
+        law: Bounds.
+        tank: Changed in place.
         work_j: Energy W that the controlled port gave away; negative if it absorbed some, which refills.
         received_j: Energy that came through the channel, not negative.
     """
-    level = state.level_j - work_j + received_j
-    over, under = max(level - config.capacity_j, 0.0), max(-level, 0.0)
-    return TankState(
-        x=math.sqrt(2.0 * min(max(level, 0.0), config.capacity_j)),
-        sent_j=state.sent_j,
-        overflow_j=state.overflow_j + over,
-        deficit_j=state.deficit_j + under,
-    )
+    after = level(tank) - work_j + received_j
+    tank.overflow_j += max(after - law.capacity_j, 0.0)
+    tank.deficit_j += max(-after, 0.0)
+    tank.x = math.sqrt(2.0 * min(max(after, 0.0), law.capacity_j))
 
 
-def send_surplus(state: TankState, config: TankConfig, period_s: float) -> tuple[TankState, float]:
-    """Take the energy P_out T_s for the other side out of the tank.
+@compiled
+def send_surplus(law: TankLaw, tank: Tank, period_s: float) -> float:
+    """Take the energy P_out T_s for the other side out of the tank; how much it is [J].
 
     P_out = min(max(T - target, 0) / send_time, send_limit), and never more than the surplus.
     """
-    surplus = max(state.level_j - config.target_j, 0.0)
-    energy = min(surplus, period_s * min(surplus / config.send_time_s, config.send_limit_w))
-    if energy == 0.0:
-        return state, 0.0
-    taken = TankState(
-        x=math.sqrt(2.0 * (state.level_j - energy)),
-        sent_j=state.sent_j + energy,
-        overflow_j=state.overflow_j,
-        deficit_j=state.deficit_j,
-    )
-    return taken, energy
+    now = level(tank)
+    surplus = max(now - law.target_j, 0.0)
+    energy = min(surplus, period_s * min(surplus / law.send_time_s, law.send_limit_w))
+    if energy > 0.0:
+        tank.x = math.sqrt(2.0 * (now - energy))
+        tank.sent_j += energy
+    return energy
 
 
+@compiled
 def affordable(work_j: float, own_work_j: float, budget_j: float) -> float:
     """Largest factor k in [0, 1] for a force so that k W + k^2 W_own <= budget; 0 if there is none.
 

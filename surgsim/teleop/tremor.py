@@ -10,7 +10,6 @@ from surgsim.catalog import PartConfig
 from surgsim.compiled import compiled
 
 Array = NDArray[np.float64]
-_BLOCK = 256
 
 
 class TremorConfig(PartConfig):
@@ -45,22 +44,3 @@ def shake(a1: float, a2: float, noise: Array, last: Array, before: Array) -> Non
     for i in range(last.size):
         new = a1 * last[i] + a2 * before[i] + noise[i]
         before[i], last[i] = last[i], new
-
-
-class Tremor:
-    """Second-order resonance driven by white noise, with unit variance times rms_m^2 per axis: `shake`."""
-
-    def __init__(self, config: TremorConfig, period_s: float, rng: np.random.Generator) -> None:
-        self._a1, self._a2, self._gain = resonance(config, period_s)
-        self._period_s = period_s
-        self._rng = rng
-        self._last, self._before = np.zeros(3), np.zeros(3)
-        self._noise, self._used = np.zeros((0, 3)), 0
-
-    def step(self) -> tuple[Array, Array]:
-        """Next displacement (3,) [m] and velocity (3,) [m/s]."""
-        if self._used == len(self._noise):
-            self._noise, self._used = self._gain * self._rng.standard_normal((_BLOCK, 3)), 0
-        shake(self._a1, self._a2, self._noise[self._used], self._last, self._before)
-        self._used += 1
-        return self._last.copy(), (self._last - self._before) / self._period_s

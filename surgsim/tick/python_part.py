@@ -83,6 +83,12 @@ def _enter_part_in_kernels(bits: Any) -> Any:
 
 
 @compiled
+def enter(entry: Array) -> int:
+    """Enter a Python part within a kernel, by its `PythonPart.gains`; its status."""
+    return _enter_part(entry[0])
+
+
+@compiled
 def python_kernel(gains: Any, seen: Any, memory: Any, out: Any) -> int:
     """The trampoline of every kind of kernel: ask the Python part whose address is the first gain."""
     return _enter_part(gains[0])

@@ -38,16 +38,44 @@ def _doubles(address: Any, rows: Any, columns: Any) -> Any:
     return view
 
 
-def integers(address: int, size: int) -> Ids:
-    """The whole numbers at `address` as an array (size,), not copied."""
+def words(address: int, size: int) -> Ids:
+    """The 64-bit integers at `address` as an array (size,), not copied."""
     pointer = ctypes.cast(int(address), ctypes.POINTER(ctypes.c_int64))
+    return np.ctypeslib.as_array(pointer, (int(size),))
+
+
+@overload(words)
+def _words(address: Any, size: Any) -> Any:
+    def view(address: Any, size: Any) -> Any:
+        return carray(_pointer(address), (size,), np.int64)  # type: ignore[call-arg]
+
+    return view
+
+
+def integers(address: int, size: int) -> Any:
+    """The C integers at `address` as an array (size,), not copied."""
+    pointer = ctypes.cast(int(address), ctypes.POINTER(ctypes.c_int32))
     return np.ctypeslib.as_array(pointer, (int(size),))
 
 
 @overload(integers)
 def _integers(address: Any, size: Any) -> Any:
     def view(address: Any, size: Any) -> Any:
-        return carray(_pointer(address), (size,), np.int64)  # type: ignore[call-arg]
+        return carray(_pointer(address), (size,), np.int32)  # type: ignore[call-arg]
+
+    return view
+
+
+def octets(address: int, size: int) -> Any:
+    """The bytes at `address` as an array (size,), not copied."""
+    pointer = ctypes.cast(int(address), ctypes.POINTER(ctypes.c_uint8))
+    return np.ctypeslib.as_array(pointer, (int(size),))
+
+
+@overload(octets)
+def _octets(address: Any, size: Any) -> Any:
+    def view(address: Any, size: Any) -> Any:
+        return carray(_pointer(address), (size,), np.uint8)  # type: ignore[call-arg]
 
     return view
 

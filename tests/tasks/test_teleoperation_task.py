@@ -16,7 +16,8 @@ from surgsim.tasks.teleoperation import TeleoperationConfig
 from surgsim.tasks.teleoperation_program import GoalConfig, board_goals, way_points
 from surgsim.teleop.channel import ChannelConfig
 from surgsim.teleop.operator import HandCommand
-from surgsim.teleop.tip_work import TipWork
+from surgsim.teleop.tip_work import TipWork, add_tip_work
+from surgsim.tick.arrays import new
 
 START = np.array([0.0, 0.65, -0.03])
 ONE_GOAL = (GoalConfig(position_m=(0.02, 0.65, -0.03)),)
@@ -89,10 +90,10 @@ def test_the_remote_tank_pays_what_the_tip_gives_to_its_surroundings():
 def test_work_against_a_spring_comes_back_whole(stiffness):
     """Forces lag their positions by a step, as a plant's do; the naive pairing is off by k T v^2 t."""
     x = 1e-3 * (1.0 - np.cos(np.linspace(0.0, 4.0 * np.pi, 400)))
-    work, total, naive = TipWork(np.zeros(3)), 0.0, 0.0
+    work, total, naive = new(TipWork, 0), 0.0, 0.0
     for k in range(1, len(x)):
         force = np.array([-stiffness * x[k - 1], 0.0, 0.0])  # acted from k - 1 to k
-        total += work.add(np.array([x[k], 0.0, 0.0]), force)
+        total += add_tip_work(work, np.array([x[k], 0.0, 0.0]), force)
         naive -= float(force[0]) * (x[k] - x[k - 1])
     stored = 0.5 * stiffness * x.max() ** 2
     assert abs(total) < 1e-3 * stored

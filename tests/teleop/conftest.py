@@ -5,14 +5,13 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from surgsim.teleop.account import ACCOUNT_COLUMNS, account
-from surgsim.teleop.channel import Channel, ChannelConfig
-from surgsim.teleop.operator import Goal
-from surgsim.teleop.operator_side import OPERATOR_COLUMNS, OperatorSide, OperatorSideConfig
-from surgsim.teleop.remote_side import REMOTE_COLUMNS, RemoteMeasurement, RemoteSide, RemoteSideConfig
+from surgsim.tasks.base import Feedback
+from surgsim.tasks.teleoperation import TeleoperationConfig
+from surgsim.tasks.teleoperation_program import GoalConfig
+from surgsim.teleop.teleoperator import COLUMNS, Law
+from surgsim.tick.overlay import laid_over
 
 PERIOD_S = 0.001
-COLUMNS = (*OPERATOR_COLUMNS, *REMOTE_COLUMNS, *ACCOUNT_COLUMNS)
 NAMES = (*(name for block in COLUMNS for name in block.columns), "x_m", "y_m", "z_m", "force_n", "done")
 
 
@@ -29,50 +28,41 @@ class PointMass:
 
     def __post_init__(self):
         self.p, self.v = np.zeros(3), np.zeros(3)
-        self.force, self.work_j = np.zeros(3), 0.0
+        self.force = np.zeros(3)
 
     def step(self, v_d, budget_j):
         power = PERIOD_S * float(self.force @ v_d)
         if power > budget_j:  # the passivity row, met by the smallest change of v_d
             v_d = v_d - self.force * (power - budget_j) / (PERIOD_S * float(self.force @ self.force))
-        h, self.work_j = PERIOD_S / self.substeps, 0.0
+        h = PERIOD_S / self.substeps
         for _ in range(self.substeps):
             drive = self.servo_ns_per_m * (v_d - self.v)
             drive *= min(1.0, self.servo_limit_n / max(np.linalg.norm(drive), 1e-9))
             before = self.v
             self.v = before + h / self.mass_kg * (drive - self.force)
-            old = self.p
-            self.p = old + h * self.v
-            new = np.array([self.wall_n_per_m * max(self.p[0] - self.wall_m, 0.0), 0.0, 0.0])
-            self.work_j += float(0.5 * (self.force + new) @ (self.p - old))
-            self.force = new
+            self.p = self.p + h * self.v
+            self.force = np.array([self.wall_n_per_m * max(self.p[0] - self.wall_m, 0.0), 0.0, 0.0])
 
 
-def _run(goals, *, operator=None, remote=None, channel=None, mass=None, seed=0, duration_s=20.0, push=None):
+def _run(goals, *, mass=None, seed=0, duration_s=20.0, change=None, **keys):
     """Signals of a run as columns; stops half a second after the operator is done.
 
-    `push(t)` is added to the hand's wrench's target: extra force of the hand on the handle (3,).
+    `keys` are those of the task's config; `change` may change its numbers, a `Law`, before the start.
     """
-    operator, remote = operator or OperatorSideConfig(), remote or RemoteSideConfig()
-    channel, mass = channel or ChannelConfig(), mass or PointMass()
-    seeds = np.random.SeedSequence(seed).spawn(3)
-    near = OperatorSide(operator, goals, mass.p, channel.energy, seeds[0])
-    far = RemoteSide(remote, mass.p, channel.energy, PERIOD_S)
-    forth, back = (Channel(channel, np.random.default_rng(s)) for s in seeds[1:])
+    mass = mass or PointMass()
+    task = TeleoperationConfig(goals=goals, **keys).build(mass.p, PERIOD_S, np.random.SeedSequence(seed))
+    if change is not None:
+        change(laid_over(Law, task.gains))
+        task.reset()
     rows, done_s = [], np.inf
     for k in range(round(duration_s / PERIOD_S)):
         t = k * PERIOD_S
-        sent = near.step(t, back.receive(t))
-        forth.send(t, sent.message, sent.energy_j)
-        measured = RemoteMeasurement(position=mass.p.copy(), force=mass.force.copy(), work_j=mass.work_j)
-        order = far.step(t, forth.receive(t), measured)
-        back.send(t, order.message, order.energy_j)
-        books = account(near, far, forth, back)
-        rows.append(
-            (*near.signals(), *far.signals(), *books, *mass.p, np.linalg.norm(mass.force), sent.hand.done)
-        )
-        mass.step(order.velocity, order.budget_j)
-        done_s = min(done_s, t) if sent.hand.done else done_s
+        zero = np.zeros(3)
+        order = task.command(t, Feedback(p_WT=mass.p, v_WT=zero, R_WT=np.eye(3), w_WT=zero, f_T=-mass.force))
+        done = task.values()[NAMES.index("operator_done")]
+        rows.append((*task.values(), *mass.p, np.linalg.norm(mass.force), done))
+        mass.step(order.v_WTd, np.inf if order.budget is None else order.budget.most_j)
+        done_s = min(done_s, t) if done else done_s
         if t > done_s + 0.5:
             break
     return dict(zip(NAMES, np.array(rows).T, strict=True))
@@ -91,6 +81,6 @@ def point_mass():
 @pytest.fixture
 def goal():
     def make(*position, **changes):
-        return Goal(position=tuple(float(x) for x in position), **changes)
+        return GoalConfig(position_m=tuple(float(x) for x in position), **changes)
 
     return make

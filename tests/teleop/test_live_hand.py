@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from surgsim.errors import SurgsimError
-from surgsim.teleop.console import Console, ConsoleConfig
+from surgsim.teleop.console import ConsoleConfig, new_console, step_console
 from surgsim.teleop.manual.hand import LEAD_M, LiveHand
 from surgsim.teleop.manual.intent import Intent
 from surgsim.teleop.manual.tape import HEADER, Player, Recorder, read_tape
@@ -19,14 +19,14 @@ PLAIN = MappingConfig()
 
 def operate(source, ticks, mapping=PLAIN, held=False):
     """(handle positions, commands) of the hand on a console that no motor drives, or that stands still."""
-    console = Console(ConsoleConfig())
+    _console, law, memory = new_console(ConsoleConfig())
     hand = LiveHand(OperatorConfig(), mapping, source, 0.001)
-    state, places, commands = console.state(), [], []
+    state, places, commands = memory.state, [], []
     for k in range(ticks):
         command = hand.step(1e-3 * k, np.zeros(3), state)
         if not held:
-            state = console.step(np.zeros(6), command.wrench)
-        places.append(state.position)
+            step_console(law, memory, np.zeros(6), command.wrench)
+        places.append(state.position.copy())
         commands.append(command)
     return np.array(places), commands
 

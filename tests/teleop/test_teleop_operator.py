@@ -4,40 +4,85 @@ from collections import deque
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
-from surgsim.teleop.console import Console, ConsoleConfig
-from surgsim.teleop.mapping import Mapping, MappingConfig
-from surgsim.teleop.operator import Goal, Operator, OperatorConfig
-from surgsim.teleop.reach import Reach, ReachConfig, aim, movement_time, scatter
-from surgsim.teleop.tremor import Tremor, TremorConfig
+from surgsim.teleop.console import ConsoleConfig, new_console, step_console
+from surgsim.teleop.mapping import MappingConfig, align, to_remote
+from surgsim.teleop.operator import (
+    Goal,
+    HandAction,
+    Operator,
+    OperatorConfig,
+    OperatorLaw,
+    describe_operator,
+    goal_rows,
+    operate,
+)
+from surgsim.teleop.reach import Reach, ReachConfig, ReachLaw, aim, movement_time, reach_at, scatter
+from surgsim.teleop.tremor import TremorConfig, resonance, shake
+from surgsim.tick.arrays import new
+from surgsim.tick.overlay import take
 
 PERIOD_S = 0.001
 STILL = OperatorConfig(tremor=TremorConfig(rms_m=0.0), reach=ReachConfig(scatter_s=0.0, scatter_floor_m=0.0))
 
 
+class Alone:
+    """An operator at a console, with enough noise drawn for `periods`; what it does is in `action`."""
+
+    def __init__(self, config, goals, *, scale=0.5, seed=0, periods=40_000):
+        self._console, self.law, self.handle = new_console(ConsoleConfig())
+        self.operator, self.state, self.action = new(OperatorLaw, 0), new(Operator, 0), new(HandAction, 0)
+        noise = describe_operator(self.operator, config, PERIOD_S)
+        align(self.operator.mapping, MappingConfig(scale=scale), self.handle.state.position, np.zeros(3))
+        self.operator.goal_count, self.operator.scatter = len(goals), 3 * periods
+        random = np.random.default_rng(seed)
+        self._goals = goal_rows(goals).ravel()
+        self._draws = random.standard_normal((2 * periods, 3))
+        self._draws[:periods] *= noise
+
+    def decide(self, t_s, seen):
+        draws, handle = self._draws.ravel(), self.handle.state
+        operate(self.operator, self._goals, self.state, draws, t_s, seen, handle, self.action)
+        return self.action.copy()
+
+    def move(self, wrench):
+        step_console(self.law, self.handle, np.zeros(6), wrench)
+
+    def tip(self):
+        tip = np.zeros(3)
+        to_remote(self.operator.mapping, self.handle.state.position, tip)
+        return tip
+
+
+def reach_law(config):
+    law = new(ReachLaw, 0)
+    take(law, config)
+    return law
+
+
 def work_alone(goals, config=None, *, scale=0.5, delay_s=0.3, seed=0, duration_s=30.0):
-    """Tip and state of a run in which the tip copies the handle and is seen `delay_s` later."""
-    console = Console(ConsoleConfig())
-    state = console.state()
-    mapping = Mapping.aligned(MappingConfig(scale=scale), state.position, np.zeros(3))
-    operator = Operator(config or OperatorConfig(), goals, mapping, PERIOD_S, np.random.SeedSequence(seed))
+    """Tip and actions of a run in which the tip copies the handle and is seen `delay_s` later."""
+    alone = Alone(config or OperatorConfig(), goals, scale=scale, seed=seed)
     screen = deque([np.zeros(3)] * (round(delay_s / PERIOD_S) + 1), maxlen=round(delay_s / PERIOD_S) + 1)
-    tips, commands = [], []
+    tips, actions = [], []
     for k in range(round(duration_s / PERIOD_S)):
-        screen.append(mapping.to_remote(state.position))
-        command = operator.step(k * PERIOD_S, screen[0], state)
-        state = console.step(np.zeros(6), command.wrench)
-        tips.append(mapping.to_remote(state.position))
-        commands.append(command)
-        if command.done:
+        screen.append(alone.tip())
+        actions.append(alone.decide(k * PERIOD_S, screen[0]))
+        alone.move(actions[-1].wrench)
+        tips.append(alone.tip())
+        if actions[-1].done:
             break
-    return np.array(tips), commands
+    return np.array(tips), actions
 
 
 def test_minimum_jerk_against_its_boundary_conditions_and_peak():
-    reach = Reach(start_s=1.0, duration_s=0.8, origin=np.zeros(3), change=np.array([0.1, 0.0, 0.0]))
+    reach = new(Reach, 0)
+    reach.start_s, reach.duration_s, reach.change[0] = 1.0, 0.8, 0.1
     times = np.linspace(0.9, 2.0, 4001)
-    p, v = (np.array(rows) for rows in zip(*map(reach.at, times), strict=True))
+    p, v = np.zeros((4001, 3)), np.zeros((4001, 3))
+    for k, t in enumerate(times):
+        reach_at(reach, t, p[k], v[k])
     assert p[0] == pytest.approx(np.zeros(3), abs=0.0)
     assert p[-1] == pytest.approx(reach.change)
     assert v.max() == pytest.approx(1.875 * 0.1 / 0.8, rel=1e-4)
@@ -46,34 +91,42 @@ def test_minimum_jerk_against_its_boundary_conditions_and_peak():
 
 
 def test_duration_follows_fitts_and_the_speed_limit():
-    config = ReachConfig(speed_limit_m_per_s=10.0)
-    times = [movement_time(0.1, width, config) for width in (0.01, 0.005, 0.0025)]
+    law = reach_law(ReachConfig(speed_limit_m_per_s=10.0))
+    times = [movement_time(law, 0.1, width) for width in (0.01, 0.005, 0.0025)]
     assert np.diff(times) == pytest.approx([0.15, 0.15])
     assert times[0] == pytest.approx(0.1 + 0.15 * np.log2(20.0))
-    slow = ReachConfig(speed_limit_m_per_s=0.05)
-    assert 1.875 * 0.1 / movement_time(0.1, 0.01, slow) == pytest.approx(0.05)
+    slow = reach_law(ReachConfig(speed_limit_m_per_s=0.05))
+    assert 1.875 * 0.1 / movement_time(slow, 0.1, 0.01) == pytest.approx(0.05)
 
 
 def test_end_points_scatter_more_when_faster():
-    config, rng = ReachConfig(speed_limit_m_per_s=10.0), np.random.default_rng(0)
-    target = np.array([0.1, 0.0, 0.0])
+    law, rng = reach_law(ReachConfig(speed_limit_m_per_s=10.0)), np.random.default_rng(0)
+    target, reach = np.array([0.1, 0.0, 0.0]), new(Reach, 0)
+
+    def missed(width):
+        aim(law, reach, target, width, 0.0, rng.standard_normal(3))
+        return reach.change - target
+
     spread = []
     for width in (0.04, 0.002):
-        ends = [aim(np.zeros(3), target, width, 0.0, config, rng).change - target for _ in range(1500)]
-        spread.append(np.std(ends))
-        assert spread[-1] == pytest.approx(scatter(0.1, movement_time(0.1, width, config), config), rel=0.05)
+        spread.append(np.std([missed(width) for _ in range(1500)]))
+        assert spread[-1] == pytest.approx(scatter(law, 0.1, movement_time(law, 0.1, width)), rel=0.05)
     assert spread[0] > spread[1]
 
 
 def test_tremor_has_its_amplitude_and_band():
-    tremor = Tremor(TremorConfig(), PERIOD_S, np.random.default_rng(0))
-    x, v = (np.array(rows)[2000:] for rows in zip(*(tremor.step() for _ in range(102_000)), strict=True))
+    a1, a2, noise = resonance(TremorConfig(), PERIOD_S)
+    last, before, x = np.zeros(3), np.zeros(3), np.zeros((102_000, 3))
+    for k, row in enumerate(noise * np.random.default_rng(0).standard_normal(x.shape)):
+        shake(a1, a2, row, last, before)
+        x[k] = last
+    x = x[2000:]
     assert x.std(axis=0) == pytest.approx(np.full(3, 7e-5), rel=0.1)
     power = np.abs(np.fft.rfft(x, axis=0)) ** 2
     frequency = np.fft.rfftfreq(len(x), PERIOD_S)
     inside = power[(frequency > 8.0) & (frequency < 12.0)].sum() / power.sum()
     assert inside == pytest.approx(2.0 / np.pi * np.arctan(2.0), abs=0.03)
-    assert np.diff(x, axis=0) / PERIOD_S == pytest.approx(v[1:])
+    assert np.array_equal(before, x[-2])
 
 
 @pytest.mark.parametrize("scale", [0.25, 1.0])
@@ -117,27 +170,20 @@ def test_a_goal_out_of_reach_is_given_up_and_counted():
 
 
 def test_hand_force_is_the_impedance_law():
-    console = Console(ConsoleConfig())
-    state = console.state()
-    mapping = Mapping.aligned(MappingConfig(), state.position, np.zeros(3))
-    operator = Operator(STILL, (), mapping, PERIOD_S, np.random.SeedSequence(0))
-    assert operator.step(0.0, np.zeros(3), state).done
-    moved = console.step(np.zeros(6), np.array([2.0, 1.0, -1.0, 0.0, 0.0, 0.0]))
-    force = operator.step(PERIOD_S, np.zeros(3), moved).wrench[:3]
-    expected = 135.0 * (state.position - moved.position) - 6.45 * moved.velocity
-    assert force == pytest.approx(expected)
+    alone = Alone(STILL, ())
+    start = alone.handle.state.copy()
+    assert alone.decide(0.0, np.zeros(3)).done
+    alone.move(np.array([2.0, 1.0, -1.0, 0.0, 0.1, 0.0]))
+    moved = alone.handle.state
+    found = alone.decide(PERIOD_S, np.zeros(3)).wrench
+    assert found[:3] == pytest.approx(135.0 * (start.position - moved.position) - 6.45 * moved.velocity)
+    turn = Rotation.from_matrix(moved.rotation @ start.rotation.T).as_rotvec()
+    assert found[3:] == pytest.approx(-0.15 * turn - 0.003 * moved.angular_velocity, rel=1e-6, abs=1e-12)
+    assert np.abs(turn).max() > 1e-6
 
 
-def test_same_seed_same_forces_and_reset_begins_again():
+def test_same_noise_same_forces():
     goals = (Goal(position=(0.02, 0.01, 0.0)),)
     runs = [work_alone(goals, seed=seed)[0] for seed in (5, 5, 6)]
     assert np.array_equal(runs[0], runs[1])
     assert not np.array_equal(runs[0][:500], runs[2][:500])
-    console = Console(ConsoleConfig())
-    state = console.state()
-    mapping = Mapping.aligned(MappingConfig(), state.position, np.zeros(3))
-    operator = Operator(OperatorConfig(), goals, mapping, PERIOD_S, np.random.SeedSequence(5))
-    first = [operator.step(k * PERIOD_S, np.zeros(3), state).wrench for k in range(600)]
-    operator.reset()
-    again = [operator.step(k * PERIOD_S, np.zeros(3), state).wrench for k in range(600)]
-    assert np.array_equal(first, again)

@@ -3,22 +3,17 @@
 import numpy as np
 import pytest
 
+from surgsim.scenario.load import load_scenario
+from surgsim.simulate.loop import Simulation
+from surgsim.simulate.setup import prepare
 from surgsim.teleop.channel import ChannelConfig
-from surgsim.teleop.operator import OperatorConfig
-from surgsim.teleop.operator_side import OPERATOR_COLUMNS, OperatorSide, OperatorSideConfig
-from surgsim.teleop.remote_side import REMOTE_COLUMNS, RemoteSideConfig
+from surgsim.teleop.operator import HandCommand, OperatorConfig
 from surgsim.teleop.tank import TankConfig
+from surgsim.teleop.teleoperator import COLUMNS
 
 BAD = ChannelConfig(jitter_s=0.005, loss=0.1, duplicate=0.05)
 LIGHT_GRIP = OperatorConfig(stiffness_n_per_m=20.0, damping_ns_per_m=1.0)
 PUSH = {"push": True, "dwell_s": 3.0}
-
-
-def sides(mode, **changes):
-    return {
-        "operator": OperatorSideConfig(passivity=mode, **changes),
-        "remote": RemoteSideConfig(passivity=mode),
-    }
 
 
 def tanks_hold(run):
@@ -62,7 +57,7 @@ def test_without_tanks_a_light_grip_lets_the_delayed_spring_feed_energy_out(tele
     """K_v (x(t - 2 delta) - x(t)) drives motions between 1/(4 delta) and 1/(2 delta): 1.7 to 3.3 Hz."""
     goals = (goal(0.04, 0.0, 0.0, timeout_s=8.0),)
     runs = {
-        mode: teleoperate(goals, **sides(mode, operator=LIGHT_GRIP), duration_s=9.0)
+        mode: teleoperate(goals, passivity=mode, operator=LIGHT_GRIP, duration_s=9.0)
         for mode in ("off", "tank", "tdpa")
     }
     speed = {mode: np.abs(run["handle_velocity_x_m_per_s"][-2000:]).max() for mode, run in runs.items()}
@@ -77,9 +72,13 @@ def test_without_tanks_a_light_grip_lets_the_delayed_spring_feed_energy_out(tele
 
 @pytest.mark.parametrize("stiffness", [200.0, 1000.0])
 def test_the_tank_holds_at_any_gain(teleoperate, goal, point_mass, stiffness):
-    side = sides("tank", operator=LIGHT_GRIP, stiffness_n_per_m=stiffness)
     run = teleoperate(
-        (goal(0.04, 0.0, 0.0, **PUSH),), **side, channel=BAD, mass=point_mass(wall_m=0.02), duration_s=8.0
+        (goal(0.04, 0.0, 0.0, **PUSH),),
+        operator=LIGHT_GRIP,
+        stiffness_n_per_m=stiffness,
+        channel=BAD,
+        mass=point_mass(wall_m=0.02),
+        duration_s=8.0,
     )
     assert run["force_scale"].min() < 1.0
     assert run["tank_operator_j"].min() > 0.5 * TankConfig().floor_j
@@ -88,15 +87,17 @@ def test_the_tank_holds_at_any_gain(teleoperate, goal, point_mass, stiffness):
 
 def test_an_empty_remote_tank_stops_the_push(teleoperate, goal, point_mass):
     """With nothing from the operator's tank the wall gets what is in the remote one, however far the push."""
-    mean = OperatorSideConfig(tank=TankConfig(send_limit_w=0.0))
-    small = TankConfig(initial_j=0.02, target_j=0.02, floor_j=0.01)
     stored = {}
-    for name, tank in (("small", small), ("large", TankConfig())):
-        remote = RemoteSideConfig(tank=tank, drift_speed_m_per_s=0.1)
+    for name, level in (("small", 0.02), ("large", TankConfig().initial_j)):
+
+        def poor(law, level=level):
+            law.operator.tank.send_limit_w = 0.0
+            law.remote.tank.initial_j = law.remote.tank.target_j = level
+
         run = teleoperate(
             (goal(0.05, 0.0, 0.0, **PUSH),),
-            operator=mean,
-            remote=remote,
+            drift_speed_m_per_s=0.1,
+            change=poor,
             mass=point_mass(wall_m=0.02),
             duration_s=6.0,
         )
@@ -129,22 +130,48 @@ def test_runs_are_deterministic(teleoperate, goal):
 
 def test_signals_are_named_once_and_complete(teleoperate, goal):
     run = teleoperate((goal(0.02, 0.0, 0.0),), duration_s=0.01)
-    names = [name for block in (*OPERATOR_COLUMNS, *REMOTE_COLUMNS) for name in block.columns]
+    names = [name for block in COLUMNS for name in block.columns]
     assert len(set(names)) == len(names)
-    assert all(np.isfinite(run[name]).all() for name in names)
+    assert all(np.isfinite(run[name]).all() for name in set(names) - {"setpoint_age_s"})
 
 
-def test_another_hand_can_hold_the_handle():
-    class Nobody:
-        def step(self, t_s, seen_tip, handle):
-            from surgsim.teleop.operator import HandCommand
+class Drawing:
+    """Pulls in circles, and remembers how often it was asked."""
 
-            return HandCommand(wrench=np.zeros(6), jaw=0.5, goal=0, done=False, missed=0)
+    asked = 0
 
-    side = OperatorSide(
-        OperatorSideConfig(), (), np.zeros(3), "power", np.random.SeedSequence(0), hand=Nobody()
-    )
-    for k in range(100):
-        sent = side.step(k * 0.001, [])
-    assert sent.message.position == pytest.approx(np.zeros(3), abs=1e-9)
-    assert sent.message.jaw == 0.5
+    def step(self, t_s, seen_tip, handle):
+        self.asked += 1
+        wrench = np.zeros(6)
+        wrench[:2] = 0.5 * np.cos(0.02 * self.asked), 0.5 * np.sin(0.02 * self.asked)
+        return HandCommand(wrench=wrench, jaw=0.5, goal=0, done=False, missed=0)
+
+
+def test_a_fork_keeps_the_hand_in_python():
+    setup = prepare(load_scenario("teleop_free_motion_panda"))
+    setup.task.hold(Drawing())
+    simulation = Simulation(setup)
+    simulation.advance(60)
+    fork = simulation.fork()
+    for one in (simulation, fork):
+        one.advance(200)
+    a, b = (one.trace() for one in (simulation, fork))
+    kept = [k for k, name in enumerate(a.columns) if name != "control_time_s"]
+    np.testing.assert_array_equal(a.data[:, kept], b.data[:, kept])
+    assert np.ptp(a["handle_x_m"]) > 1e-4
+
+
+class Failing:
+    def step(self, t_s, seen_tip, handle):
+        if t_s > 0.0105:
+            raise KeyError("no hand")
+        return HandCommand(wrench=np.zeros(6), jaw=0.5, goal=0, done=False, missed=0)
+
+
+def test_what_a_hand_in_python_raises_comes_out_of_the_loop():
+    setup = prepare(load_scenario("teleop_free_motion_panda"))
+    setup.task.hold(Failing())
+    simulation = Simulation(setup)
+    with pytest.raises(KeyError, match="no hand"):
+        simulation.run()
+    assert simulation.time_s == pytest.approx(0.011)

@@ -76,6 +76,27 @@ for controller in ("vprnn", "rcm_inverse_dynamics"):
 """
 
 
+TELEOPERATION = """
+import numpy as np
+from surgsim.scenario.load import load_scenario
+from surgsim.simulate.loop import simulate
+
+bad = "task.channel={delay_s: 0.005, jitter_s: 0.004, loss: 0.2, burst_packets: 3.0, duplicate: 0.3}"
+soon = ["task.duration_s=0.12", "task.operator.reaction_s=0.01", "task.operator.gaze_time_s=0.01"]
+for mode in ("tank", "tdpa", "off"):
+    trace = simulate(load_scenario("teleop_wall_panda", assignments=[bad, *soon, f"task.passivity={mode}"]))
+    kept = [k for k, name in enumerate(trace.columns) if name != "control_time_s"]
+    assert np.ptp(trace["handle_z_m"]) > 1e-4 and trace["late_packets"][-1] > 5.0
+    print(mode, trace.data[:, kept].tobytes().hex())
+"""
+
+
+def test_a_teleoperation_in_python_gives_the_bits_of_the_compiled_loop():
+    python, compiled = (_printed(TELEOPERATION, compiled=compiled) for compiled in (False, True))
+    assert len(python) == 3
+    assert python == compiled
+
+
 def test_a_whole_run_in_python_gives_the_bits_of_the_compiled_loop():
     python, compiled = (_printed(RUN, compiled=compiled) for compiled in (False, True))
     assert len(python) == 2

@@ -16,141 +16,211 @@ step late.
 """
 
 import math
-from dataclasses import dataclass
+from typing import Any
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
+from surgsim.compiled import compiled
 from surgsim.models.build import Scene
 from surgsim.models.peg_board import PegBoardLayout
 from surgsim.plant.props.base import TIP_CONTACT_BIT, TIP_GEOM
 from surgsim.plant.props.peg_scene import hold_name, ring_name
+from surgsim.tick.algebra import norm, transposed_times
+from surgsim.tick.arrays import Array, Record, World
+from surgsim.tick.views import body_place, doubles, integers, octets, vector
 
-Array = NDArray[np.float64]
-_POSE = 10  # numbers of a weld's data that say where
+NOBODY = -1
+BODY, WELD, FORCE, FIRST_GEOM, GEOMS, DOF, RING = range(7)
+"""Where in a ring's row its numbers are, and its length: body, weld, where the sensors have its hold's force,
+first geom and how many, first degree of freedom."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class GraspLaw:
-    """Numbers of the grasp; see the module's text."""
+class GraspLaw(Record):
+    """Numbers of the grasp; see the module's text.
+
+    Attributes:
+        close_at: How far closed the jaws catch.
+        open_at: How far closed they let go.
+        capture_distance_m: How near to a rim's surface they catch it [m].
+        grip_force_n: Force at which a ring slips out of closed jaws [N].
+        ring_radius_m: R of the rim's middle circle [m].
+        rim_radius_m: r of the rim [m].
+        tip_radius_m: Of the jaws' contact sphere [m].
+        jaws: Body of the jaws.
+        load: Where the force on the jaws is in the sensors.
+        rings: How many there are.
+        welds: Constraints of the model.
+        weld_size: Numbers of a constraint.
+        geoms: Geoms of the model.
+        eq_data: Address of the constraints' numbers in MuJoCo's model.
+        eq_active: Address of the constraints' states in MuJoCo's data.
+        geom_conaffinity: Address of the geoms' contact bits in MuJoCo's model.
+    """
 
     close_at: float
     open_at: float
     capture_distance_m: float
     grip_force_n: float
+    ring_radius_m: float
+    rim_radius_m: float
+    tip_radius_m: float
+    jaws: int
+    load: int
+    rings: int
+    welds: int
+    weld_size: int
+    geoms: int
+    eq_data: int
+    eq_active: int
+    geom_conaffinity: int
 
 
-class Grasp:
+class Grasp(Record):
     """The jaws' hold on at most one ring.
 
-    The welds' poses and the rings' contact bits are kept in the model, which belongs to the plant: a new
-    `Grasp` on a used model starts by letting all rings go.
+    The welds' poses and the rings' contact bits are kept in the model, which belongs to the plant: a run
+    begins by letting all rings go.
 
     Attributes:
-        held: The ring in the jaws, or None.
+        held: The ring in the jaws, or NOBODY.
+        leaving: The ring that was let go and may still overlap the contact sphere, or NOBODY.
+        ready: Whether the jaws have opened since they closed last.
     """
 
-    def __init__(self, scene: Scene, data: mujoco.MjData, layout: PegBoardLayout, law: GraspLaw) -> None:
-        model = self._model = scene.model
-        self._data, self._law = data, law
-        self._R, self._r = layout.ring_radius_m, layout.rim_radius_m
-        count = range(len(layout.source_m))
-        self._jaws = model.body("jaws").id
-        self._bodies = [model.body(ring_name(ring)).id for ring in count]
-        self._welds = [model.equality(hold_name(ring)).id for ring in count]
-        self._forces = [self._sensor(hold_name(ring)) for ring in count]
-        self._load = self._sensor("jaws_load")
-        self._tip_radius = float(model.geom(TIP_GEOM).size[0])
-        self.held: int | None = None
-        self._leaving: int | None = None
-        self._ready = True
-        for ring in count:
-            self._touch(ring, touching=True)
-
-    def act(self, jaw: float) -> int | None:
-        """Catch, let slip or let go, the jaws closed by `jaw`; returns the ring that slipped, if any."""
-        law, slipped = self._law, None
-        if self._leaving is not None and self._tip_gap(self._leaving) > 0.0:
-            self._touch(self._leaving, touching=True)
-            self._leaving = None
-        if self.held is not None and jaw < law.open_at:
-            self._let_go()
-        elif self.held is not None and self.hold_force() > law.grip_force_n * jaw:
-            slipped = self.held
-            self._let_go()
-        if jaw < law.open_at:
-            self._ready = True
-        elif jaw >= law.close_at and self._ready:
-            self._ready = False
-            self._catch()
-        return slipped
-
-    def hold_force(self) -> float:
-        """Force of the jaws on the ring in them over the last step [N]."""
-        return 0.0 if self.held is None else _norm(self._forces[self.held])
-
-    def load(self) -> float:
-        """Force of everything on the jaws over the last step [N]: rings in them, contact with the rest."""
-        return _norm(self._load)
-
-    def _catch(self) -> None:
-        gaps = [self._gap(ring, self._data.xpos[self._jaws]) for ring in range(len(self._bodies))]
-        ring = int(np.argmin(gaps))
-        if gaps[ring] > self._law.capture_distance_m:
-            return
-        if self._leaving is not None:
-            self._touch(self._leaving, touching=True)
-            self._leaving = None
-        weld, data = self._welds[ring], self._data
-        self._model.eq_data[weld, :_POSE] = self._relative_pose(ring)
-        data.eq_active[weld] = 1
-        self._touch(ring, touching=False)
-        self.held = ring
-
-    def _let_go(self) -> None:
-        assert self.held is not None
-        self._data.eq_active[self._welds[self.held]] = 0
-        self._leaving, self.held = self.held, None
-
-    def _relative_pose(self, ring: int) -> Array:
-        """The ring's place in the jaws as a weld's data (10,).
-
-        The tip in the ring's frame, the tip in the jaws', and the ring's orientation in the jaws' (wxyz).
-        """
-        data, jaws, body = self._data, self._jaws, self._bodies[ring]
-        arm = data.xmat[body].reshape(3, 3).T @ (data.xpos[jaws] - data.xpos[body])
-        inverse, turn = np.zeros(4), np.zeros(4)
-        mujoco.mju_negQuat(inverse, data.xquat[jaws])
-        mujoco.mju_mulQuat(turn, inverse, data.xquat[body])
-        return np.array([*arm, 0.0, 0.0, 0.0, *turn])
-
-    def _gap(self, ring: int, point: Array) -> float:
-        """Distance [m] of a point (3,) from the surface of a ring: of a circle, less the rim's radius."""
-        body = self._bodies[ring]
-        x, y, z = self._data.xmat[body].reshape(3, 3).T @ (point - self._data.xpos[body])
-        return float(np.hypot(np.hypot(x, y) - self._R, z)) - self._r
-
-    def _tip_gap(self, ring: int) -> float:
-        """Room between the jaws' contact sphere and a ring [m]."""
-        axis = self._data.xmat[self._jaws].reshape(3, 3)[:, 2]
-        centre = self._data.xpos[self._jaws] - self._tip_radius * axis
-        return self._gap(ring, centre) - self._tip_radius
-
-    def _touch(self, ring: int, *, touching: bool) -> None:
-        """Whether a ring's rim touches the jaws' contact sphere."""
-        model, body = self._model, self._bodies[ring]
-        first, count = int(model.body_geomadr[body]), int(model.body_geomnum[body])
-        for geom in range(first, first + count):
-            if model.geom_conaffinity[geom]:
-                bits = int(model.geom_conaffinity[geom])
-                model.geom_conaffinity[geom] = bits | TIP_CONTACT_BIT if touching else bits & ~TIP_CONTACT_BIT
-
-    def _sensor(self, name: str) -> Array:
-        first = int(self._model.sensor(name).adr[0])
-        force: Array = self._data.sensordata[first : first + 3]
-        return force
+    held: int
+    leaving: int
+    ready: int
 
 
-def _norm(force: Array) -> float:
-    return math.hypot(*force.tolist())
+def describe_grasp(law: Any, scene: Scene, data: mujoco.MjData, layout: PegBoardLayout) -> Array:
+    """Fill the places in a model and its data; answers the rings' rows (k, 6)."""
+    model = scene.model
+    law.ring_radius_m, law.rim_radius_m = layout.ring_radius_m, layout.rim_radius_m
+    law.tip_radius_m = model.geom(TIP_GEOM).size[0]
+    law.jaws, law.load = model.body("jaws").id, model.sensor("jaws_load").adr[0]
+    law.rings, law.welds, law.geoms = len(layout.source_m), model.neq, model.ngeom
+    law.weld_size = model.eq_data.shape[1]
+    law.eq_data, law.eq_active = model.eq_data.ctypes.data, data.eq_active.ctypes.data
+    law.geom_conaffinity = model.geom_conaffinity.ctypes.data
+    rows = np.zeros((len(layout.source_m), RING))
+    for ring, row in enumerate(rows):
+        body, hold = model.body(ring_name(ring)).id, hold_name(ring)
+        row[BODY], row[WELD] = body, model.equality(hold).id
+        row[FORCE], row[DOF] = model.sensor(hold).adr[0], model.joint(ring_name(ring)).dofadr[0]
+        row[FIRST_GEOM], row[GEOMS] = model.body_geomadr[body], model.body_geomnum[body]
+    return rows
+
+
+def open_jaws(law: Any, rings: Array, grasp: Any) -> None:
+    """Begin a run: nothing is held, and all rings touch the jaws."""
+    grasp.held, grasp.leaving, grasp.ready = NOBODY, NOBODY, 1
+    for ring in range(len(rings)):
+        touch(law, rings, ring, True)
+
+
+@compiled
+def grip(law: GraspLaw, rings: Array, grasp: Grasp, world: World) -> int:
+    """Catch, let slip or let go, the jaws closed by `world.jaw`; the ring that slipped, or NOBODY."""
+    slipped = NOBODY
+    if grasp.leaving != NOBODY and _tip_gap(law, rings, grasp.leaving, world) > 0.0:
+        touch(law, rings, grasp.leaving, True)
+        grasp.leaving = NOBODY
+    if grasp.held != NOBODY:
+        slips = hold_force(rings, grasp, world) > law.grip_force_n * world.jaw
+        if world.jaw < law.open_at or slips:
+            if world.jaw >= law.open_at:
+                slipped = grasp.held
+            octets(law.eq_active, law.welds)[int(rings[grasp.held, WELD])] = 0
+            grasp.leaving, grasp.held = grasp.held, NOBODY
+    if world.jaw < law.open_at:
+        grasp.ready = 1
+    elif world.jaw >= law.close_at and grasp.ready:
+        grasp.ready = 0
+        _catch(law, rings, grasp, world)
+    return slipped
+
+
+@compiled
+def hold_force(rings: Array, grasp: Grasp, world: World) -> float:
+    """Force of the jaws on the ring in them over the last step [N]."""
+    return 0.0 if grasp.held == NOBODY else sensed(world, int(rings[grasp.held, FORCE]))
+
+
+@compiled
+def sensed(world: World, at: int) -> float:
+    """Norm of the force that a sensor measured over the last step [N]."""
+    return norm(vector(world.sensordata + 8 * at, 3))
+
+
+@compiled
+def _catch(law: GraspLaw, rings: Array, grasp: Grasp, world: World) -> None:
+    """Weld the nearest ring to the jaws if it is within reach."""
+    point, nearest, ring = body_place(world, law.jaws), math.inf, 0
+    for k in range(law.rings):
+        gap = _gap(law, rings, k, point, world)
+        if gap < nearest:
+            nearest, ring = gap, k
+    if nearest > law.capture_distance_m:
+        return
+    if grasp.leaving != NOBODY:
+        touch(law, rings, grasp.leaving, True)
+        grasp.leaving = NOBODY
+    weld = int(rings[ring, WELD])
+    _keep_pose(law, int(rings[ring, BODY]), world, doubles(law.eq_data, law.welds, law.weld_size)[weld])
+    octets(law.eq_active, law.welds)[weld] = 1
+    touch(law, rings, ring, False)
+    grasp.held = ring
+
+
+@compiled
+def _keep_pose(law: GraspLaw, body: int, world: World, out: Array) -> None:
+    """The ring's place in the jaws as a weld's numbers.
+
+    The tip in the ring's frame, the tip in the jaws', and the ring's orientation in the jaws' (wxyz).
+    """
+    quats = doubles(world.xquat, world.nbody, 4)
+    a, b = quats[law.jaws], quats[body]
+    _within(body, body_place(world, law.jaws), world, out[:3])
+    for i in range(3):
+        out[3 + i] = 0.0
+    out[6] = a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3]
+    out[7] = a[0] * b[1] - a[1] * b[0] - a[2] * b[3] + a[3] * b[2]
+    out[8] = a[0] * b[2] + a[1] * b[3] - a[2] * b[0] - a[3] * b[1]
+    out[9] = a[0] * b[3] - a[1] * b[2] + a[2] * b[1] - a[3] * b[0]
+
+
+@compiled
+def _within(body: int, point: Array, world: World, out: Array) -> None:
+    """A point (3,) [m] in a body's frame."""
+    place, away = body_place(world, body), np.empty(3)
+    for i in range(3):
+        away[i] = point[i] - place[i]
+    transposed_times(doubles(world.xmat + 72 * body, 3, 3), away, out)
+
+
+@compiled
+def _gap(law: GraspLaw, rings: Array, ring: int, point: Array, world: World) -> float:
+    """Distance [m] of a point (3,) from the surface of a ring: of a circle, less the rim's radius."""
+    p = np.empty(3)
+    _within(int(rings[ring, BODY]), point, world, p)
+    across = math.sqrt(p[0] * p[0] + p[1] * p[1]) - law.ring_radius_m
+    return math.sqrt(across * across + p[2] * p[2]) - law.rim_radius_m
+
+
+@compiled
+def _tip_gap(law: GraspLaw, rings: Array, ring: int, world: World) -> float:
+    """Room between the jaws' contact sphere and a ring [m]."""
+    place, turn, centre = body_place(world, law.jaws), doubles(world.xmat + 72 * law.jaws, 3, 3), np.empty(3)
+    for i in range(3):
+        centre[i] = place[i] - law.tip_radius_m * turn[i, 2]
+    return _gap(law, rings, ring, centre, world) - law.tip_radius_m
+
+
+@compiled
+def touch(law: GraspLaw, rings: Array, ring: int, touching: bool) -> None:
+    """Whether a ring's rim touches the jaws' contact sphere."""
+    bits, first = integers(law.geom_conaffinity, law.geoms), int(rings[ring, FIRST_GEOM])
+    for geom in range(first, first + int(rings[ring, GEOMS])):
+        if bits[geom] != 0:
+            bits[geom] = bits[geom] | TIP_CONTACT_BIT if touching else bits[geom] & ~TIP_CONTACT_BIT

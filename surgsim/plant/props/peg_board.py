@@ -1,21 +1,38 @@
 """Peg and ring: rings to be taken from their pegs and put on others."""
 
-from typing import Annotated, Literal, Self
+from collections.abc import Mapping
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field, NonNegativeFloat, PositiveFloat, model_validator
 
 from surgsim.columns import Block, scalar
+from surgsim.compiled import compiled
 from surgsim.models.build import Scene
 from surgsim.models.peg_board import PegBoardLayout
 from surgsim.plant.props.base import Prop
-from surgsim.plant.props.grasp import Grasp, GraspLaw
-from surgsim.plant.props.peg_scene import add_board, add_holds, add_rings, ring_name
-from surgsim.plant.props.ring_state import REST_S, RingState, find_states, time_at_rest
+from surgsim.plant.props.grasp import (
+    BODY,
+    DOF,
+    NOBODY,
+    RING,
+    Grasp,
+    GraspLaw,
+    describe_grasp,
+    grip,
+    hold_force,
+    open_jaws,
+    sensed,
+)
+from surgsim.plant.props.peg_scene import add_board, add_holds, add_rings
+from surgsim.plant.props.ring_state import ELSEWHERE, GRASPED, ON_TARGET, REST_S, add_rest, place_of
+from surgsim.tick.algebra import times
+from surgsim.tick.arrays import Array, Record, World
+from surgsim.tick.overlay import laid_over, overlay, take
+from surgsim.tick.status import GOES_ON
+from surgsim.tick.views import body_place, vector
 
-Array = NDArray[np.float64]
 Jaw = Annotated[float, Field(gt=0.0, lt=1.0)]
 
 
@@ -46,33 +63,115 @@ class PegBoardConfig(PegBoardLayout):
         return PegBoard(self)
 
 
+class Board(Record):
+    """Numbers of board and grasp; after it in the gains the rings' rows (k, 6) and the pegs (2k, 2) [m].
+
+    Attributes:
+        beside: How far beside a peg a ring's middle may be [m].
+        below: How far above the board [m].
+        origin: Of the board (3,) [m].
+        R_BW: World in the board's frame (3, 3).
+        grasp: Of the jaws.
+    """
+
+    SHAPES: ClassVar[dict[str, str]] = {"origin": "3", "R_BW": "3 3"}
+    beside: float
+    below: float
+    origin: Array
+    R_BW: Array
+    grasp: GraspLaw
+
+
+class Handled(Record):
+    """What is remembered; after it the rows of the rings (k, 3): state, time at rest [s], whether let go.
+
+    Attributes:
+        drops: Rings dropped.
+        grasp: The jaws' hold.
+    """
+
+    drops: int
+    grasp: Grasp
+
+
+BOARD, BOARD_SIZE = overlay(Board)
+HANDLED, HANDLED_SIZE = overlay(Handled)
+_STATE, _REST, _LET_GO, _ROW = range(4)
+
+
+@compiled
+def handle_rings(gains: Array, world: World, memory: Array, out: Array) -> int:
+    """Catch, hold or let go, and look where the rings are; once a step.
+
+    A ring that was let go and rests on no peg was dropped, as was one that slipped.
+    """
+    board, seen = gains[:BOARD_SIZE].view(BOARD)[0], memory[:HANDLED_SIZE].view(HANDLED)[0]
+    count, grasp = board.grasp.rings, seen.grasp
+    end = BOARD_SIZE + RING * count
+    rings, pegs = gains[BOARD_SIZE:end].reshape(-1, RING), gains[end:].reshape(-1, 2)
+    rows = memory[HANDLED_SIZE:].reshape(-1, _ROW)
+    before = grasp.held
+    if grip(board.grasp, rings, grasp, world) != NOBODY:
+        seen.drops += 1
+    elif before != NOBODY and grasp.held == NOBODY:
+        rows[before, _LET_GO] = 1.0
+    if grasp.held != NOBODY:
+        rows[grasp.held, _LET_GO] = 0.0
+    away, p = np.empty(3), np.empty(3)
+    for i in range(count):
+        row, place = rows[i], body_place(world, int(rings[i, BODY]))
+        twist = vector(world.qvel + 8 * int(rings[i, DOF]), 6)
+        row[_REST] = add_rest(row[_REST], twist, i == grasp.held, world.timestep_s)
+        for k in range(3):
+            away[k] = place[k] - board.origin[k]
+        times(board.R_BW, away, p)
+        held = i == grasp.held
+        row[_STATE] = GRASPED if held else place_of(p, row[_REST], pegs, board.beside, board.below)
+        if row[_LET_GO] == 1.0 and row[_REST] > REST_S:
+            row[_LET_GO] = 0.0
+            if row[_STATE] == ELSEWHERE:
+                seen.drops += 1
+    return GOES_ON
+
+
+@compiled
+def count_rings(gains: Array, world: World, memory: Array, out: Array) -> int:
+    """States, rings on targets, drops, force on the jaws, force of the hold."""
+    board, seen = gains[:BOARD_SIZE].view(BOARD)[0], memory[:HANDLED_SIZE].view(HANDLED)[0]
+    count, rows = board.grasp.rings, memory[HANDLED_SIZE:].reshape(-1, _ROW)
+    rings = gains[BOARD_SIZE : BOARD_SIZE + RING * count].reshape(-1, RING)
+    on_target = 0
+    for i in range(count):
+        out[i] = rows[i, _STATE]
+        on_target += rows[i, _STATE] == ON_TARGET
+    out[count], out[count + 1] = on_target, seen.drops
+    out[count + 2], out[count + 3] = sensed(world, board.grasp.load), hold_force(rings, seen.grasp, world)
+    return GOES_ON
+
+
 class PegBoard(Prop):
-    """Board, pegs, rings and the jaws' hold on them.
+    """Board, pegs, rings and the jaws' hold on them: `handle_rings`.
 
     A ring is on a peg if the peg stands in its hole and its middle is lower than half the peg's height; on a
     target it must also be at rest and out of the jaws. A drop is a ring that slipped out of the jaws, or was
     let go and came to rest on no peg.
     """
 
+    kernels: Mapping[str, Any] = {"push": handle_rings, "values": count_rings}
+
     def __init__(self, config: PegBoardConfig) -> None:
         self._c = config
-        self._count = len(config.source_m)
-        rings = tuple(str(i + 1) for i in range(self._count))
+        count = len(config.source_m)
         self.columns = (
-            Block("ring_state", rings, ""),
+            Block("ring_state", tuple(str(i + 1) for i in range(count)), ""),
             scalar("rings_on_target"),
             scalar("ring_drop_count"),
             scalar("jaws_load", "n"),
             scalar("grip_force", "n"),
         )
-        self._board = (
-            np.array(config.position_m),
-            config.R_WB.T.copy(),
-            np.array([*config.source_m, *config.target_m]),
-            np.array([config.hole_radius_m, 0.5 * config.peg_height_m]),
-        )
-        self._grasp: Grasp | None = None
-        self._forget()
+        pegs = np.array([*config.source_m, *config.target_m])
+        self.gains = np.concatenate([np.zeros(BOARD_SIZE + RING * count), pegs.ravel()])
+        self.memory = np.zeros(HANDLED_SIZE + _ROW * count)
 
     def modify(self, spec: mujoco.MjSpec) -> None:
         """Add board, rings and the welds that hold them."""
@@ -82,60 +181,11 @@ class PegBoard(Prop):
 
     def start(self, scene: Scene, data: mujoco.MjData, rng: np.random.Generator, dt_s: float) -> None:
         """All rings on their sources, jaws open."""
-        c = self._c
-        law = GraspLaw(
-            close_at=c.close_at,
-            open_at=c.open_at,
-            capture_distance_m=c.capture_distance_m,
-            grip_force_n=c.grip_force_n,
-        )
-        self._data, self._timestep = data, float(scene.model.opt.timestep)
-        self._bodies = np.array([scene.model.body(ring_name(ring)).id for ring in range(self._count)])
-        dofs = [int(scene.model.joint(ring_name(ring)).dofadr[0]) for ring in range(self._count)]
-        self._dofs = np.array(dofs)[:, None] + np.arange(6)
-        self._grasp = Grasp(scene, data, c, law)
-        self._forget()
-
-    def grip(self, jaw: float) -> None:
-        """Remember how far the jaws are told to close."""
-        self._jaw = jaw
-
-    def push(self, t_s: float, scene: Scene, data: mujoco.MjData) -> None:
-        """Catch, hold or let go, and look where the rings are; once a step."""
-        grasp = self._grasp
-        assert grasp is not None
-        before = grasp.held
-        slipped = grasp.act(self._jaw)
-        if slipped is not None:
-            self._drops += 1
-        elif before is not None and grasp.held is None:
-            self._let_go[before] = True
-        if grasp.held is not None:
-            self._let_go[grasp.held] = False
-        self._look(grasp.held)
-
-    def values(self) -> Array:
-        """States, rings on targets, drops, force on the jaws, force of the hold."""
-        load = hold = 0.0
-        if self._grasp is not None:
-            load, hold = self._grasp.load(), self._grasp.hold_force()
-        on_target = np.count_nonzero(self._states == RingState.ON_TARGET)
-        return np.array([*self._states, on_target, self._drops, load, hold])
-
-    def _forget(self) -> None:
-        self._jaw = 0.0
-        self._states = np.full(self._count, float(RingState.ON_SOURCE))
-        self._let_go = np.zeros(self._count, dtype=bool)
-        self._drops = 0
-        self._rest_s = np.zeros(self._count)
-
-    def _look(self, held: int | None) -> None:
-        """Find each ring's state; a ring that was let go and rests on no peg was dropped."""
-        data, ring = self._data, -1 if held is None else held
-        time_at_rest(self._rest_s, data.qvel[self._dofs], ring, self._timestep)
-        positions = data.xpos[self._bodies]
-        find_states(self._states, self._rest_s, positions, ring, *self._board)
-        for i in np.flatnonzero(self._let_go):
-            if self._rest_s[i] > REST_S:
-                self._let_go[i] = False
-                self._drops += int(self._states[i] == RingState.ELSEWHERE)
+        c, board, seen = self._c, laid_over(Board, self.gains), laid_over(Handled, self.memory)
+        board.beside, board.below = c.hole_radius_m, 0.5 * c.peg_height_m
+        board.origin[:], board.R_BW[:] = c.position_m, c.R_WB.T
+        take(board.grasp, c)
+        rings = describe_grasp(board.grasp, scene, data, c)
+        self.gains[BOARD_SIZE : BOARD_SIZE + rings.size] = rings.ravel()
+        self.memory[:] = 0.0
+        open_jaws(board.grasp, rings, seen.grasp)

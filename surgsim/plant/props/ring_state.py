@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surgsim.compiled import compiled
+from surgsim.tick.algebra import dot
 
 Array = NDArray[np.float64]
 
@@ -24,56 +25,44 @@ class RingState(IntEnum):
     ELSEWHERE = 3
 
 
+ON_SOURCE, GRASPED, ON_TARGET, ELSEWHERE = (float(state) for state in RingState)
+"""The states as they are recorded."""
+
+
 @compiled
-def time_at_rest(rest_s: Array, twist: Array, held: int, step_s: float) -> None:
-    """Add `step_s` to the time that each ring out of the jaws has been at rest, or begin anew.
+def add_rest(rest_s: float, twist: Array, is_held: bool, step_s: float) -> float:
+    """The time that a ring has been at rest, `step_s` later; zero in the jaws or in motion.
 
     Args:
-        rest_s: Time at rest (n,) [s], changed in place.
-        twist: Velocity of each ring (n, 6) [m/s, rad/s].
-        held: The ring in the jaws, or -1.
+        rest_s: So far [s].
+        twist: Velocity of the ring (6,) [m/s, rad/s].
+        is_held: Whether it is in the jaws.
         step_s: Time since the last call [s].
     """
-    for i in range(len(rest_s)):
-        v, w = twist[i, :3], twist[i, 3:]
-        slow = v @ v < REST_M_PER_S**2 and w @ w < REST_RAD_PER_S**2
-        rest_s[i] = rest_s[i] + step_s if slow and i != held else 0.0
+    v, w = dot(twist[:3], twist[:3]), dot(twist[3:], twist[3:])
+    slow = v < REST_M_PER_S * REST_M_PER_S and w < REST_RAD_PER_S * REST_RAD_PER_S
+    return rest_s + step_s if slow and not is_held else 0.0
 
 
 @compiled
-def find_states(
-    states: Array,
-    rest_s: Array,
-    positions: Array,
-    held: int,
-    origin: Array,
-    R_BW: Array,
-    pegs: Array,
-    reach: Array,
-) -> None:
-    """Fill the rings' states.
+def place_of(p: Array, rest_s: float, pegs: Array, beside: float, below: float) -> float:
+    """`RingState` of a ring that is not in the jaws.
 
     Args:
-        states: `RingState` of each ring (n,), changed in place.
-        rest_s: How long each has been at rest (n,) [s].
-        positions: Their middles, world frame (n, 3) [m].
-        held: The ring in the jaws, or -1.
-        origin: Origin of the board, world frame (3,) [m].
-        R_BW: World in the board's frame (3, 3).
+        p: Its middle in the board's frame (3,) [m].
+        rest_s: How long it has been at rest [s].
         pegs: Places on the board (2m, 2) [m]: m sources, then m targets.
-        reach: How far beside a peg, and how far above the board, a ring's middle may be [m].
+        beside: How far beside a peg its middle may be [m].
+        below: How far above the board [m].
     """
-    for i in range(len(states)):
-        if i == held:
-            states[i] = 1.0
-            continue
-        states[i] = 3.0
-        p = R_BW @ (positions[i] - origin)
-        if p[2] >= reach[1]:
-            continue
-        for k in range(len(pegs)):
-            if math.hypot(p[0] - pegs[k, 0], p[1] - pegs[k, 1]) < reach[0]:
-                if 2 * k < len(pegs):
-                    states[i] = 0.0
-                elif rest_s[i] > REST_S:
-                    states[i] = 2.0
+    state = ELSEWHERE
+    if p[2] >= below:
+        return state
+    for k in range(len(pegs)):
+        x, y = p[0] - pegs[k, 0], p[1] - pegs[k, 1]
+        if math.sqrt(x * x + y * y) < beside:
+            if 2 * k < len(pegs):
+                state = ON_SOURCE
+            elif rest_s > REST_S:
+                state = ON_TARGET
+    return state

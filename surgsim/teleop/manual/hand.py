@@ -1,15 +1,17 @@
 """A hand that follows a person's input."""
 
 import math
+from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from surgsim.teleop.console import ConsoleState
-from surgsim.teleop.impedance import hand_wrench
+from surgsim.teleop.impedance import Grip, hand_wrench
 from surgsim.teleop.manual.intent import Intent, Source
 from surgsim.teleop.mapping import MappingConfig, rotation_matrix
 from surgsim.teleop.operator import HandCommand, OperatorConfig
+from surgsim.tick.arrays import new
+from surgsim.tick.overlay import take
 
 Array = NDArray[np.float64]
 EASE_S = 0.05
@@ -35,7 +37,8 @@ class LiveHand:
     def __init__(
         self, config: OperatorConfig, mapping: MappingConfig, source: Source, period_s: float
     ) -> None:
-        self._c, self._source, self._period = config, source, period_s
+        self._source, self._period, self._grip = source, period_s, new(Grip, 0)
+        take(self._grip, config)
         self._R_OW = rotation_matrix(mapping.rotation_wxyz).T / mapping.scale
         self._blur = 1.0 - math.exp(-period_s / EASE_S)
         self._jaw_step = period_s / config.jaw_time_s
@@ -43,15 +46,17 @@ class LiveHand:
         self._position: Array | None = None
         self._jaw = 0.0
 
-    def step(self, t_s: float, seen_tip: ArrayLike, handle: ConsoleState) -> HandCommand:
+    def step(self, t_s: float, seen_tip: Array, handle: Any) -> HandCommand:
         """What the hand does in the period from `t_s` [s]; what it sees is for the person to judge."""
         if self._position is None:
-            self._position, self._upright = handle.position, handle.rotation
+            self._position, self._upright = handle.position.copy(), handle.rotation.copy()
         intent = self._source(t_s)
         intended = self._position = self._moved(self._position, intent, handle)
         self._jaw += min(max(intent.jaw - self._jaw, -self._jaw_step), self._jaw_step)
+        wrench = np.zeros(6)
+        hand_wrench(self._grip, intended, self._velocity, self._upright, handle, wrench)
         return HandCommand(
-            wrench=hand_wrench(self._c, intended, self._velocity, self._upright, handle),
+            wrench=wrench,
             jaw=self._jaw,
             goal=0,
             done=intent.end,
@@ -59,7 +64,7 @@ class LiveHand:
             intended=intended,
         )
 
-    def _moved(self, position: Array, intent: Intent, handle: ConsoleState) -> Array:
+    def _moved(self, position: Array, intent: Intent, handle: Any) -> Array:
         self._velocity = self._velocity + self._blur * (self._R_OW @ intent.velocity - self._velocity)
         lead = position + self._period * self._velocity - handle.position
         length = math.sqrt(float(lead @ lead))

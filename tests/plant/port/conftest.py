@@ -9,11 +9,37 @@ import pytest
 
 from surgsim.models.build import Scene, build, build_arm
 from surgsim.models.config import RobotConfig, SceneConfig, TrocarConfig, WallConfig
-from surgsim.plant.ledger import EnergyLedger
+from surgsim.plant.ledger import EnergyLedger, after_step, before_step, fill_terms
 from surgsim.plant.port import Port
+from surgsim.plant.records import world_of
 
 Q = np.array([1.6, -0.4, 0.2, 1.5, 0.1, -1.0, 0.3])
 DEPTH_M = 0.18  # of the tip below the port
+
+
+class Books:
+    """An energy ledger outside a plant: its kernels on arrays of its own."""
+
+    def __init__(self, scene: Scene, data: mujoco.MjData, port: Port | None = None) -> None:
+        self.ledger = EnergyLedger(scene, data, port)
+        self.world = world_of(scene, data, float(scene.model.opt.timestep))
+        self.values = np.zeros(len(EnergyLedger.COLUMNS))
+
+    def start(self) -> None:
+        self.ledger.memory[:] = 0.0
+
+    def _call(self, kernel: Callable[..., int]) -> None:
+        assert kernel(self.ledger.gains, self.world, self.ledger.memory, self.values) == 0
+
+    def before_step(self) -> None:
+        self._call(before_step)
+
+    def after_step(self) -> None:
+        self._call(after_step)
+
+    def terms(self) -> np.ndarray:
+        self._call(fill_terms)
+        return self.values.copy()
 
 
 @dataclass
@@ -23,7 +49,7 @@ class Rig:
     scene: Scene
     data: mujoco.MjData
     port: Port
-    ledger: EnergyLedger
+    ledger: Books
     q: np.ndarray
     stiffness: float = 400.0
     damping: float = 20.0
@@ -73,6 +99,10 @@ class Rig:
     def term(self, name: str) -> float:
         return float(self.ledger.terms()[EnergyLedger.COLUMNS.index(name)])
 
+    def books(self, port: Port | None = None) -> Books:
+        """Another ledger of the same mechanism; without the port it knows nothing of the bore."""
+        return Books(self.scene, self.data, port)
+
     def axes(self) -> np.ndarray:
         """Columns x, y, z of the port's frame."""
         return self.data.site_xmat[self.scene.trocar_site].reshape(3, 3).copy()
@@ -117,7 +147,7 @@ def rig() -> Callable[..., Rig]:
         scene = build(arm.model_copy(update={"trocar": trocar, "theatre": False}), drawn=False)
         state = mujoco.MjData(scene.model)
         port = Port(scene, state)
-        made = Rig(scene, state, port, EnergyLedger(scene, state, port), q)
+        made = Rig(scene, state, port, Books(scene, state, port), q)
         made.reset()
         return made
 

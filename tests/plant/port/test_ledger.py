@@ -125,7 +125,7 @@ def test_without_the_port_the_bore_counts_as_applied(rig):
     push = made.axes() @ [4.0, 0.0, 3.0]
     made.push = lambda t: push
     whole = made.ledger
-    blind = EnergyLedger(made.scene, made.data)
+    blind = made.books()
     for _ in range(300):
         made.port.act()
         for ledger in (whole, blind):
@@ -148,7 +148,7 @@ def test_dry_friction_of_joints_is_a_loss(rig):
     model.dof_frictionloss[made.scene.dof_ids] = 0.5
     data = mujoco.MjData(model)
     made.data, made.port = data, Port(made.scene, data)
-    made.ledger = EnergyLedger(made.scene, data, made.port)
+    made.ledger = made.books(made.port)
     made.reset()
     losses = np.array(made.run(1.0, lambda: (made.term("friction_loss"), 0.5 * np.abs(data.qvel).sum())))
     assert losses[-1, 0] == pytest.approx(0.0005 * losses[:, 1].sum(), rel=0.05)

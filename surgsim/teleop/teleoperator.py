@@ -1,0 +1,202 @@
+"""Both sides and the channels between them, as one kernel.
+
+        x_o, v_o, jaw ── channel ──▶ v_d = trust (v + k (x - p_WT)),  budget T - epsilon ──▶ controller
+        hand ◀── K_v (p_WT(t - delta) - x_o) ◀── channel ── p_WT, force, energy ◀── arm
+
+The numbers are a `Law`, then the goals' rows; the memory is a `State`, then the tables of `Places`.
+"""
+
+import math
+from typing import ClassVar, NamedTuple
+
+from surgsim.columns import scalar, vector, width
+from surgsim.compiled import compiled
+from surgsim.teleop.account import ACCOUNT_COLUMNS, fill_account
+from surgsim.teleop.channel import DRAW, PACKET, Channel, ChannelConfig, ChannelLaw, send
+from surgsim.teleop.messages import CONTENT, FORCE, POSITION, TANK, VELOCITY
+from surgsim.teleop.operator_side import (
+    OPERATOR_COLUMNS,
+    OperatorSide,
+    OperatorSideLaw,
+    fill_operator_columns,
+    step_operator_side,
+)
+from surgsim.teleop.remote_side import (
+    REMOTE_COLUMNS,
+    RemoteSide,
+    RemoteSideLaw,
+    fill_remote_columns,
+    step_remote_side,
+)
+from surgsim.teleop.tip_work import TipWork, add_tip_work
+from surgsim.tick.arrays import Array, Command, Feedback, Record
+from surgsim.tick.overlay import overlay
+from surgsim.tick.status import GOES_ON
+
+COLUMNS = (
+    *OPERATOR_COLUMNS,
+    *REMOTE_COLUMNS,
+    *ACCOUNT_COLUMNS,
+    vector("velocity_issued", "m_per_s"),
+    scalar("setpoint_age", "s"),
+)
+_REMOTE = width(OPERATOR_COLUMNS)
+_ACCOUNT = _REMOTE + width(REMOTE_COLUMNS)
+_ISSUED = _ACCOUNT + width(ACCOUNT_COLUMNS)
+_AGE = _ISSUED + 3
+DRAWN = 1024
+"""So many periods are drawn ahead at most."""
+
+
+class Law(Record):
+    """All numbers of a teleoperation but the goals.
+
+    Attributes:
+        hold_end_s: Time at rest after the operator is done [s].
+        start: The tip's place at first (3,) [m].
+        operator: The operator's side.
+        remote: The remote side.
+        forth: The channel to the remote side.
+        back: The channel from it.
+    """
+
+    SHAPES: ClassVar[dict[str, str]] = {"start": "3"}
+    hold_end_s: float
+    start: Array
+    operator: OperatorSideLaw
+    remote: RemoteSideLaw
+    forth: ChannelLaw
+    back: ChannelLaw
+
+
+class State(Record):
+    """All that a teleoperation remembers but tables and the console's own model.
+
+    Attributes:
+        ends: Whether it ends when the operator is done.
+        is_done: Whether the operator is done.
+        done_s: Since when [s].
+        velocity: v_d of the last period (3,) [m/s].
+        content: The message of the remote side (7,).
+        operator: The operator's side.
+        remote: The remote side.
+        forth: The channel to the remote side.
+        back: The channel from it.
+        work: Of the tip.
+    """
+
+    SHAPES: ClassVar[dict[str, str]] = {"velocity": "3", "content": str(CONTENT)}
+    ends: int
+    is_done: int
+    done_s: float
+    velocity: Array
+    content: Array
+    operator: OperatorSide
+    remote: RemoteSide
+    forth: Channel
+    back: Channel
+    work: TipWork
+
+
+LAW, LAW_SIZE = overlay(Law)
+STATE, STATE_SIZE = overlay(State)
+
+
+class Places(NamedTuple):
+    """Where the tables in the memory begin.
+
+    Attributes:
+        forth_draws: What happens to the packets to the remote side (DRAWN, 3).
+        back_draws: To those from it.
+        tremor: Noise of the tremor (DRAWN, 3) [m].
+        scatter: Of the movements (DRAWN, 3).
+        forth_taken: Numbers of the packets that the remote side took.
+        back_taken: That the operator's side took.
+        forth_ring: Packets under way to the remote side.
+        back_ring: From it.
+        end: Length of the memory.
+    """
+
+    forth_draws: int
+    back_draws: int
+    tremor: int
+    scatter: int
+    forth_taken: int
+    back_taken: int
+    forth_ring: int
+    back_ring: int
+    end: int
+
+
+def places(forth: int, back: int, forth_copies: int, back_copies: int) -> Places:
+    """Places for channels in which a packet lives for so many periods, in so many copies."""
+    sizes = (
+        *(DRAW * DRAWN, DRAW * DRAWN, 3 * DRAWN, 3 * DRAWN),
+        *(forth, back),
+        *(PACKET * forth * forth_copies, PACKET * back * back_copies),
+    )
+    begins = [STATE_SIZE]
+    for size in sizes:
+        begins.append(begins[-1] + size)
+    return Places(*begins)
+
+
+def copies(config: ChannelConfig) -> int:
+    """How often a packet can be under way at a time."""
+    return 2 if config.duplicate else 1
+
+
+@compiled
+def teleoperate(gains: Array, feedback: Feedback, memory: Array, out: Command) -> int:
+    """One control period of both sides and of the channels between them.
+
+    The command's position, to which `tip_error` refers, is the master's as received: the place that the
+    operator pointed to one channel's delay ago. The arm is asked for the velocity alone, so the error holds
+    what the slack, the walls, the budget and lost packets have left out.
+    """
+    law, state, t_s = gains[:LAW_SIZE].view(LAW)[0], memory[:STATE_SIZE].view(STATE)[0], feedback.t_s
+    operator, remote = state.operator, state.remote
+    operator.t_s = t_s
+    status, energy = step_operator_side(law.operator, gains, operator, law.back, state.back, memory)
+    if status != GOES_ON:
+        return status
+    send(law.forth, state.forth, memory, t_s, operator.content, energy)
+    work = add_tip_work(state.work, feedback.p_WT, feedback.f_T)
+    p, force = state.content[POSITION : POSITION + 3], state.content[FORCE : FORCE + 3]
+    for i in range(3):
+        p[i], force[i] = feedback.p_WT[i], -feedback.f_T[i]
+    energy = step_remote_side(law.remote, remote, law.forth, state.forth, memory, t_s, p, force, work)
+    send(law.back, state.back, memory, t_s, state.content, energy)
+    if operator.hand.done and not state.is_done:
+        state.is_done, state.done_s = 1, t_s
+    over = state.ends and state.is_done and t_s >= state.done_s + law.hold_end_s
+    out.finished = 1 if over else 0
+    _tell(law, state, feedback, out)
+    _record(law, state, t_s, out.values)
+    return GOES_ON
+
+
+@compiled
+def _tell(law: Law, state: State, feedback: Feedback, out: Command) -> None:
+    """The remote side's command to the controller."""
+    remote, limited = state.remote, law.remote.passivity == TANK
+    known = remote.receiver.highest >= 0
+    for i in range(3):
+        out.p_WTd[i] = remote.receiver.content[POSITION + i] if known else law.start[i]
+        out.v_WTd[i] = remote.velocity[i]
+        out.a_WTd[i] = (remote.velocity[i] - state.velocity[i]) / law.remote.period_s
+        state.velocity[i] = remote.velocity[i]
+        out.budget_f_T[i] = feedback.f_T[i] if limited else 0.0
+    out.jaw, out.budget_j = remote.jaw, remote.budget_j
+
+
+@compiled
+def _record(law: Law, state: State, t_s: float, values: Array) -> None:
+    """Values of `COLUMNS`."""
+    operator, remote = state.operator, state.remote
+    fill_operator_columns(operator, values)
+    fill_remote_columns(remote, values[_REMOTE:])
+    fill_account(law.operator, operator, law.remote, remote, state.forth, state.back, values[_ACCOUNT:])
+    for i in range(3):
+        values[_ISSUED + i] = operator.content[VELOCITY + i]
+    values[_AGE] = t_s - remote.receiver.sent_s if remote.receiver.highest >= 0 else math.nan
