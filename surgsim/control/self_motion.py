@@ -1,7 +1,8 @@
 """The self-motion manifold at a tip position, and the largest manipulability on it.
 
-Self-motion is all joint motion that moves neither the tip nor, with a trocar, the shaft axis. It has 2
-degrees with a trocar (elbow swivel and instrument roll, which leaves mu as it is) and 4 without.
+Self-motion is all joint motion that moves neither the tip nor, with a trocar, the shaft axis. It has n - 3
+degrees, n - 5 with a trocar. Of an arm of seven joints these are the elbow swivel and the instrument's roll,
+which leaves mu as it is.
 """
 
 from dataclasses import dataclass
@@ -24,9 +25,9 @@ class SelfMotionPoint:
     """A configuration on the manifold.
 
     Attributes:
-        q: Joint positions (7,) [rad].
+        q: Joint positions (n,) [rad].
         miss: Norm of what the constraints lack [m].
-        mu: Manipulability of the 3x7 tip Jacobian.
+        mu: Manipulability of the 3xn tip Jacobian.
         kin: Kinematics at `q`.
     """
 
@@ -50,7 +51,7 @@ class SelfMotion:
         self._high = arm.limits.q_max - margin_rad
 
     def rows(self, kin: Kinematics, p_WT: Array, p_WC: Array | None) -> tuple[Array, Array]:
-        """Constraint Jacobian (3 or 5, 7) and residual (3 or 5,) [m] for tip and trocar positions."""
+        """Constraint Jacobian (3 or 5, n) and residual (3 or 5,) [m] for tip and trocar positions."""
         residual = kin.p_WT - p_WT
         if p_WC is None:
             return kin.Jv_WT, residual
@@ -58,7 +59,7 @@ class SelfMotion:
         return np.concatenate((kin.Jv_WT, rcm.jacobian)), np.concatenate((residual, rcm.error))
 
     def project(self, q: Array, p_WT: Array, p_WC: Array | None, steps: int = 8) -> SelfMotionPoint:
-        """The point of the manifold near `q` (7,) [rad]: Newton steps of least joint motion."""
+        """The point of the manifold near `q` (n,) [rad]: Newton steps of least joint motion."""
         kin = self._arm.kinematics(q)
         J, residual = self.rows(kin, p_WT, p_WC)
         for _ in range(steps):
@@ -72,7 +73,7 @@ class SelfMotion:
         )
 
     def improve(self, point: SelfMotionPoint, p_WT: Array, p_WC: Array | None, radius: float) -> Array:
-        """Joint displacement (7,) [rad] towards larger mu, tangent to the manifold, inside the limits.
+        """Joint displacement (n,) [rad] towards larger mu, tangent to the manifold, inside the limits.
 
         A Newton step on ln(mu) with the curvature of the manifold through the Lagrangian, its eigenvalues
         made positive, at most `radius` [rad] long.
@@ -93,7 +94,7 @@ class SelfMotion:
         return self._bounded_step(point.q, Z, np.asarray(V * w @ V.T), reduced, radius)
 
     def _slopes(self, q: Array, Z: Array, multiplier: Array, p_WT: Array, p_WC: Array | None) -> Array:
-        """Derivative of grad(ln mu) - J^T multiplier along the columns of Z (7, k), central differences."""
+        """Derivative of grad(ln mu) - J^T multiplier along the columns of Z (n, k), central differences."""
         slopes = np.empty(Z.shape)
         for k in range(Z.shape[1]):
             ends = []
@@ -108,12 +109,12 @@ class SelfMotion:
         """The step inside joint limits and a box of `radius`; zero if there is none."""
         box = np.full(len(reduced), radius)
         y = DenseQp().solve(0.5 * (B + B.T), -reduced, -box, box, Z, self._low - q, self._high - q)
-        return np.zeros(7) if y is None else Z @ y
+        return np.zeros_like(q) if y is None else Z @ y
 
     def climb(
         self, q: Array, p_WT: Array, p_WC: Array | None, *, steps: int = 60, tolerance_rad: float = 1e-9
     ) -> SelfMotionPoint:
-        """The local maximum of mu that is reached from `q` (7,) [rad] by self-motion inside the limits."""
+        """The local maximum of mu that is reached from `q` (n,) [rad] by self-motion inside the limits."""
         point = self.project(q, p_WT, p_WC)
         radius = 0.3
         for _ in range(steps):
@@ -141,8 +142,9 @@ class SelfMotion:
         first = self.climb(here.q, p_WT, p_WC)
         found = [first] if self.inside(first) else []
         for _ in range(starts):
-            guess = np.clip(here.q + rng.normal(size=7), self._low, self._high)
-            guess[6] = here.q[6]
+            guess = np.clip(here.q + rng.normal(size=here.q.size), self._low, self._high)
+            if self._arm.rolls_shaft:
+                guess[-1] = here.q[-1]
             point = self.climb(guess, p_WT, p_WC)
             if self.inside(point) and self.reaches(here, point, p_WT, p_WC):
                 found.append(point)
@@ -207,13 +209,16 @@ class SelfMotion:
         return points, False
 
     def _swivel(self, point: SelfMotionPoint, p_WT: Array, p_WC: Array) -> Array:
-        """Unit joint direction (7,) of self-motion without the instrument's roll."""
+        """Unit joint direction (n,) of self-motion without the instrument's roll."""
         J, _ = self.rows(point.kin, p_WT, p_WC)
-        return np.asarray(np.linalg.qr(np.vstack([J, _ROLL]).T, mode="complete")[0][:, -1])
+        return np.asarray(np.linalg.qr(np.vstack([J, np.eye(point.q.size)[-1]]).T, mode="complete")[0][:, -1])
 
 
 def elbow_swivel_rad(kin: Kinematics) -> float:
-    """Angle of the elbow about the line from shoulder to wrist [rad], 0 where the elbow is highest."""
+    """Angle of the elbow about the line from shoulder to wrist [rad], 0 where the elbow is highest.
+
+    Of an arm of seven joints in the usual order: joints 2, 4 and 6 are in shoulder, elbow and wrist.
+    """
     shoulder, elbow, wrist = kin.anchors_W[1], kin.anchors_W[3], kin.anchors_W[5]
     axis = unit(wrist - shoulder)
     up = np.array([0.0, 0.0, 1.0])
@@ -224,4 +229,3 @@ def elbow_swivel_rad(kin: Kinematics) -> float:
 
 _DIFFERENCE_RAD = 1e-4
 _SEARCH_SEED = 20_240_917
-_ROLL = np.eye(7)[6]

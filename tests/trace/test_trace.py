@@ -8,7 +8,7 @@ import pytest
 
 from surgsim.columns import joints, scalar, vector
 from surgsim.errors import Outcome
-from surgsim.trace.trace import BASE_BLOCKS, Ending, Trace, TraceMeta
+from surgsim.trace.trace import Ending, Trace, TraceMeta, base_blocks
 
 AXES = ("x", "y", "z")
 CONTRACT = (
@@ -32,7 +32,7 @@ META = TraceMeta(
 
 
 def test_the_base_blocks_give_the_columns_that_outside_tools_rely_on():
-    columns = [column for block in BASE_BLOCKS for column in block.columns]
+    columns = [column for block in base_blocks(7) for column in block.columns]
     assert set(CONTRACT) <= set(columns)
     assert len(set(columns)) == len(columns)
     assert columns[0] == "t_s"
@@ -41,7 +41,7 @@ def test_the_base_blocks_give_the_columns_that_outside_tools_rely_on():
 @pytest.mark.parametrize(
     ("block", "first", "last"),
     [
-        (joints("tau_tip_", "nm"), "tau_tip_1_nm", "tau_tip_7_nm"),
+        (joints("tau_tip_", "nm", 7), "tau_tip_1_nm", "tau_tip_7_nm"),
         (vector("tip", "m"), "tip_x_m", "tip_z_m"),
         (vector("force", "n"), "force_x_n", "force_z_n"),
         (scalar("manipulability"), "manipulability", "manipulability"),
@@ -53,7 +53,7 @@ def test_block_columns(block, first, last):
 
 
 def _small(data):
-    return Trace(data, (scalar("t", "s"), vector("tip", "m"), joints("q", "rad")), META)
+    return Trace(data, (scalar("t", "s"), vector("tip", "m"), joints("q", "rad", 7)), META)
 
 
 def test_columns_and_blocks_are_found_by_name():

@@ -1,7 +1,7 @@
 """Self-motion optimum: go to the most manipulable posture as fast as the joints allow, then stay on it."""
 
 from dataclasses import dataclass
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,7 +27,6 @@ from surgsim.models.arm import ArmModel
 from surgsim.models.build import JointLimits
 
 Array = NDArray[np.float64]
-_ZERO = np.zeros(7)
 _HORIZON_S = 10.0
 _REHEARSAL_S = 0.02
 
@@ -43,6 +42,7 @@ class SelfMotionConfig(PartConfig):
             start configuration alone.
     """
 
+    needs_redundancy: ClassVar[int] = 1
     type: Literal["self_motion"] = "self_motion"
     k_tip: NonNegativeFloat = 5.0
     k_rcm: NonNegativeFloat = 5.0
@@ -59,8 +59,8 @@ class SelfMotionMemory:
     """State of the resolver.
 
     Attributes:
-        optimum: Joint positions (7,) of the optimum that is tracked [rad].
-        qdot: Joint velocity of the last step (7,) [rad/s].
+        optimum: Joint positions (n,) of the optimum that is tracked [rad].
+        qdot: Joint velocity of the last step (n,) [rad/s].
     """
 
     optimum: Array
@@ -120,7 +120,7 @@ class SelfMotionOptimum:
         qdot = least_velocity(J, rhs, wanted)
         if (qdot >= lower).all() and (qdot <= upper).all():
             return qdot
-        eye = np.eye(7)
+        eye = np.eye(wanted.size)
         for low, high in ((lower, upper), (problem.lower, problem.upper)):
             found = self._qp.solve(eye, -wanted, low, high, J, rhs, rhs)
             if found is not None:
@@ -132,7 +132,7 @@ class SelfMotionOptimum:
         )
 
     def _towards(self, problem: VelocityProblem, J: Array, optimum: Array, last_optimum: Array) -> Array:
-        """Velocity (7,) [rad/s] along the line to the optimum, and the optimum's own velocity.
+        """Velocity (n,) [rad/s] along the line to the optimum, and the optimum's own velocity.
 
         Slowed where following the manifold's curvature at that speed would take more than the share of the
         joints' acceleration.
@@ -140,13 +140,14 @@ class SelfMotionOptimum:
         drift = (optimum - last_optimum) / problem.dt_s
         acceleration = self._c.acceleration_share * problem.limits.acceleration
         approach = _approach(optimum - problem.q, acceleration, problem.limits.velocity, problem.dt_s)
-        centripetal = self._second_order(problem, approach) - self._second_order(problem, _ZERO)
+        at_rest = np.zeros_like(approach)
+        centripetal = self._second_order(problem, approach) - self._second_order(problem, at_rest)
         turn = least_velocity(J, centripetal)
         worst = float(np.max(np.abs(turn) / acceleration))
         return np.asarray(approach / max(1.0, worst**0.5) + drift)
 
     def _track(self, problem: VelocityProblem, optimum: Array) -> Array:
-        """The optimum (7,) for the tip position at the end of this step."""
+        """The optimum (n,) for the tip position at the end of this step."""
         T, command = problem.dt_s, problem.command
         p_next = command.p_WTd + T * command.v_WTd + 0.5 * T * T * command.a_WTd
         p_WC = problem.p_WC if problem.rcm is not None else None
@@ -186,9 +187,9 @@ class SelfMotionOptimum:
 
 @compiled
 def _approach(distance: Array, a: Array, v_max: Array, dt: float) -> Array:
-    """Velocity along `distance` (7,) at which every joint can still stop at its end."""
+    """Velocity along `distance` (n,) at which every joint can still stop at its end."""
     scale = np.inf
-    for i in range(7):
+    for i in range(distance.size):
         d = abs(distance[i])
         if d > 1e-12:
             reach = a[i] * dt
