@@ -8,6 +8,7 @@ import pytest
 
 from surgsim.columns import joints, scalar, vector
 from surgsim.errors import Outcome
+from surgsim.plant.props.peg_board import PegBoardConfig
 from surgsim.trace.trace import Ending, Trace, TraceMeta, base_blocks
 
 AXES = ("x", "y", "z")
@@ -131,3 +132,12 @@ ENDING = {"outcome": "completed", "t_s": 1.0, "detail": ""}
 def test_damaged_meta_data_is_a_value_error(text):
     with pytest.raises(ValueError):  # noqa: PT011 - JSON's own is a ValueError too
         TraceMeta.from_json(text)
+
+
+@pytest.mark.parametrize("rings", [1, 6, 7, 8])
+def test_what_is_numbered_and_no_joint_has_the_same_columns_however_many_there_are(rings):
+    pegs = [(0.03 * i - 0.1, y) for y in (-0.05, 0.05) for i in range(rings)]
+    config = PegBoardConfig(source_m=tuple(pegs[:rings]), target_m=tuple(pegs[rings:]))
+    first = config.build(np.random.default_rng(0)).columns[0]
+    assert first.columns == tuple(f"ring_state_{i}" for i in range(1, rings + 1))
+    assert joints("q", "rad", rings).columns == tuple(f"q{i}_rad" for i in range(1, rings + 1))
