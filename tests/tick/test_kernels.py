@@ -24,10 +24,12 @@ from surgsim.control.failure import ControlFailure
 from surgsim.control.port_estimators import PORT_ESTIMATORS
 from surgsim.control.resolvers import RESOLVERS
 from surgsim.control.torque_laws import TORQUE_LAWS
+from surgsim.models.config import RobotConfig, SceneConfig
 
 kinds = ((RESOLVERS, velocity_problem, "step"), (TORQUE_LAWS, torque_problem, "torque"))
 parts = [(catalog.config(name)(), make, call) for catalog, make, call in kinds for name in catalog.names()]
-for arm in map(arm_of, scenes()):
+usual = SceneConfig(robot=RobotConfig(name="lwr4plus"))
+for arm in map(arm_of, (scenes()[0], usual, scenes()[-1])):
     for config, make, call in parts:
         part = config.build(arm)
         if not hasattr(part, "kernel") or True not in cases(config, arm):
