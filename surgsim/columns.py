@@ -3,35 +3,35 @@
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-JOINTS = tuple(str(i + 1) for i in range(7))
 AXES = ("x", "y", "z")
 
 
 @dataclass(frozen=True)
 class Block:
-    """Columns that belong together, e.g. the seven joint positions.
+    """Columns that belong together, e.g. the joint positions.
 
     Attributes:
         name: Stem of the columns' names.
-        labels: What tells them apart: joints `1`..`7`, axes `x`, `y`, `z`, or one empty label.
+        labels: What tells them apart: joints `1`, `2` and so on, axes `x`, `y`, `z`, or one empty label.
         unit: SI unit suffix, empty for a pure number.
+        joiner: What stands between name and label.
     """
 
     name: str
     labels: tuple[str, ...]
     unit: str
+    joiner: str = "_"
 
     @property
     def columns(self) -> tuple[str, ...]:
         """Column names, e.g. `q1_rad`, `tip_x_m`, `manipulability`."""
-        joiner = "" if self.labels == JOINTS else "_"
-        stems = [f"{self.name}{joiner}{label}" if label else self.name for label in self.labels]
+        stems = [f"{self.name}{self.joiner}{label}" if label else self.name for label in self.labels]
         return tuple(f"{stem}_{self.unit}" if self.unit else stem for stem in stems)
 
 
-def joints(name: str, unit: str) -> Block:
-    """Block of seven joint columns."""
-    return Block(name, JOINTS, unit)
+def joints(name: str, unit: str, n: int) -> Block:
+    """Block of a column for each of `n` joints."""
+    return Block(name, tuple(str(i + 1) for i in range(n)), unit, joiner="")
 
 
 def vector(name: str, unit: str) -> Block:

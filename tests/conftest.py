@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+import usual_arm
 from batches import short_run
 
-from surgsim.contract import problems
 from surgsim.control.problem import VelocityProblem
 from surgsim.control.torque_laws.base import TorqueProblem
 from surgsim.errors import Outcome
@@ -16,7 +16,7 @@ from surgsim.models.arm import ArmModel
 from surgsim.scenario.load import load_scenario
 from surgsim.scenario.schema import Scenario
 from surgsim.simulate.setup import Setup
-from surgsim.trace.trace import BASE_BLOCKS, Ending, Trace, TraceMeta
+from surgsim.trace.trace import Ending, Trace, TraceMeta, base_blocks
 
 pytest_plugins = ["left_out"]
 
@@ -24,25 +24,25 @@ pytest_plugins = ["left_out"]
 @pytest.fixture(scope="session")
 def arm() -> ArmModel:
     """LWR4+ with the default instrument."""
-    return problems.arm()
+    return usual_arm.usual_arm()
 
 
 @pytest.fixture(scope="session")
 def random_q() -> Callable[[np.random.Generator], np.ndarray]:
     """Joint positions inside the limits and away from singularities of tip and shaft rows."""
-    return problems.random_q
+    return usual_arm.random_q
 
 
 @pytest.fixture(scope="session")
 def velocity_problem() -> Callable[..., VelocityProblem]:
     """Factory of random velocity problems; the same seed gives the same state and command."""
-    return problems.velocity_problem
+    return usual_arm.velocity_problem
 
 
 @pytest.fixture(scope="session")
 def torque_problem() -> Callable[..., TorqueProblem]:
     """Factory of random torque problems."""
-    return problems.torque_problem
+    return usual_arm.torque_problem
 
 
 @pytest.fixture(scope="session")
@@ -89,10 +89,10 @@ def trace_of() -> Callable[..., Trace]:
     """Factory of traces from a few columns or blocks; everything else is NaN, limits are 1 to 5."""
 
     def make(rows: int, period_s: float = 0.001, outcome: Outcome = Outcome.COMPLETED, **given: Any) -> Trace:
-        columns = [column for block in BASE_BLOCKS for column in block.columns]
+        columns = [column for block in base_blocks(7) for column in block.columns]
         data = np.full((rows, len(columns)), np.nan)
         data[:, columns.index("t_s")] = period_s * np.arange(rows)
-        blocks = {block.name: block.columns for block in BASE_BLOCKS}
+        blocks = {block.name: block.columns for block in base_blocks(7)}
         for name, values in given.items():
             places = [columns.index(column) for column in blocks.get(name, (name,))]
             values = np.asarray(values, dtype=float)
@@ -102,6 +102,6 @@ def trace_of() -> Callable[..., Trace]:
         limits["q_min"] = [-2.0] * 7
         ending = Ending(outcome=outcome, t_s=period_s * (rows - 1))
         meta = TraceMeta(scenario={"name": "made"}, control_period_s=period_s, limits=limits, ending=ending)
-        return Trace(data, BASE_BLOCKS, meta)
+        return Trace(data, base_blocks(7), meta)
 
     return make

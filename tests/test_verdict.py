@@ -14,7 +14,7 @@ from surgsim.scenario.load import load_scenario
 from surgsim.scenario.thresholds import ThresholdsConfig
 from surgsim.simulate.loop import simulate
 from surgsim.tasks import TASKS
-from surgsim.trace.trace import BASE_BLOCKS, Ending, Trace, TraceMeta
+from surgsim.trace.trace import Ending, Trace, TraceMeta, base_blocks
 from surgsim.verdict import Held, judge, unfinished
 
 DONE = Ending(outcome=Outcome.COMPLETED, t_s=1.0)
@@ -24,7 +24,7 @@ TELEOPERATED = (scalar("goal"), scalar("goals_missed"), scalar("operator_done"))
 
 def run(name, columns, *, extra=(), ending=DONE, settings=()):
     """A made-up trace of two rows of the shipped scenario `name`, its last row with these values."""
-    blocks = (*BASE_BLOCKS, *extra)
+    blocks = (*base_blocks(7), *extra)
     names = [column for block in blocks for column in block.columns]
     data = np.zeros((2, len(names)))
     for column, value in columns.items():

@@ -15,8 +15,8 @@ def available(kind: str) -> dict[str, str]:
 
     Example:
         >>> import surgsim
-        >>> surgsim.available("scenarios")["circle_lwr4plus"]
-        'LWR4+ follows a circle (R 2 cm) through a fixed trocar'
+        >>> surgsim.available("controllers")["pinv"]
+        'pseudo-inverse redundancy resolution over hierarchical impedance'
     """
     if kind not in KINDS:
         raise SurgsimError(unknown_name(kind, "kind of thing to list", KINDS))

@@ -5,37 +5,43 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from surgsim.contract.arms import arm_of, on_every_arm
 from surgsim.contract.check import Check, require
 from surgsim.contract.problems import velocity_problem
 from surgsim.control.policies.observation import observe
+from surgsim.models.arm import ArmModel
+from surgsim.models.config import SceneConfig
 
 Array = NDArray[np.float64]
-_SHAPES = ((3,), (7,))
 
 
-def _actions(policy: Any) -> list[Array]:
+def _actions(policy: Any, arm: ArmModel) -> list[Array]:
     """Actions on ten observations from a reset on."""
     reset = getattr(policy, "reset", None)
     if callable(reset):
         reset()
-    return [np.array(policy(observe(velocity_problem(seed))), dtype=float) for seed in range(10)]
+    return [np.array(policy(observe(velocity_problem(arm, seed))), dtype=float) for seed in range(10)]
 
 
-def acts(policy: Any) -> None:
-    """Finite actions of three entries (tip) or seven (joints), the same again after a reset."""
-    first = _actions(policy)
+@on_every_arm
+def acts(policy: Any, scene: SceneConfig) -> None:
+    """Finite actions of three entries (tip) or one for each joint, the same again after a reset."""
+    arm = arm_of(scene)
+    first, joints = _actions(policy, arm), arm.limits.q_min.shape
     for action in first:
-        require(action.shape in _SHAPES, f"an action has the shape {action.shape}, not (3,) or (7,)")
+        shape = action.shape
+        require(shape in ((3,), joints), f"an action has the shape {shape}, not (3,) or {joints}")
         require(np.isfinite(action).all(), f"an action is not finite: {action}")
         require(action.shape == first[0].shape, "actions have different shapes")
-    again = _actions(policy)
+    again = _actions(policy, arm)
     same = all(np.array_equal(a, b) for a, b in zip(first, again, strict=True))
     require(same, "after a reset the same observations give other actions")
 
 
-def leaves_the_observation(policy: Any) -> None:
+@on_every_arm
+def leaves_the_observation(policy: Any, scene: SceneConfig) -> None:
     """The observation is left as it was."""
-    seen = observe(velocity_problem(0))
+    seen = observe(velocity_problem(arm_of(scene), 0))
     before = {name: values.copy() for name, values in seen.items()}
     policy(seen)
     changed = [name for name in before if not np.array_equal(seen.get(name, np.nan), before[name])]

@@ -6,9 +6,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from surgsim.contract.arms import arm_of, on_every_arm
 from surgsim.contract.check import Check, require
-from surgsim.contract.problems import DT, arm, velocity_problem
+from surgsim.contract.problems import DT, velocity_problem
 from surgsim.control.port_estimators.base import PortProblem
+from surgsim.models.config import SceneConfig
 
 Array = NDArray[np.float64]
 
@@ -23,14 +25,16 @@ def _estimates(estimator: Any, problem: PortProblem) -> Array:
     return np.array(rows)
 
 
-def starts_as_seen(config: Any) -> None:
+@on_every_arm
+def starts_as_seen(config: Any, scene: SceneConfig) -> None:
     """Estimates are finite, begin where the trocar is seen, and are the same again."""
-    p = velocity_problem(0, trocar_speed=0.0)
-    kin, dyn = arm().evaluate(p.q, p.v)
+    arm = arm_of(scene)
+    p = velocity_problem(arm, 0, trocar_speed=0.0)
+    kin, dyn = arm.evaluate(p.q, p.v)
     problem = PortProblem(
         t_s=0.0, dt_s=DT, v=p.v, tau_measured=dyn.bias, kin=kin, dyn=dyn, p_WC=p.p_WC, v_WC=p.v_WC
     )
-    estimator = config().build(arm())
+    estimator = config().build(arm)
     first = _estimates(estimator, problem)
     require(np.isfinite(first).all(), "an estimate is not finite")
     apart = np.abs(first[0, 0] - problem.p_WC).max()

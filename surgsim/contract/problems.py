@@ -1,7 +1,5 @@
 """Random problems for resolvers and torque laws: the same seed gives the same state and command."""
 
-from functools import lru_cache
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -9,7 +7,6 @@ from surgsim.control.problem import Resolution, VelocityProblem, velocity_bounds
 from surgsim.control.rcm import rcm_kinematics
 from surgsim.control.torque_laws.base import TorqueProblem
 from surgsim.models.arm import ArmModel, Kinematics
-from surgsim.models.config import RobotConfig, SceneConfig
 from surgsim.tasks.base import TipCommand
 
 Array = NDArray[np.float64]
@@ -17,17 +14,11 @@ DT = 0.001
 """Control period of the problems [s]."""
 
 
-@lru_cache(maxsize=1)
-def arm() -> ArmModel:
-    """LWR4+ with the default instrument."""
-    return ArmModel(SceneConfig(robot=RobotConfig(name="lwr4plus")))
-
-
-def random_q(rng: np.random.Generator) -> Array:
-    """Joint positions (7,) inside the limits and away from singularities of tip and shaft rows [rad]."""
+def random_q(arm: ArmModel, rng: np.random.Generator) -> Array:
+    """Joint positions (n,) inside the limits and away from singularities of tip and shaft rows [rad]."""
     while True:
-        q: Array = 0.85 * rng.uniform(arm().limits.q_min, arm().limits.q_max)
-        kin = arm().kinematics(q)
+        q: Array = 0.85 * rng.uniform(arm.limits.q_min, arm.limits.q_max)
+        kin = arm.kinematics(q)
         rcm = rcm_kinematics(kin, kin.p_WT - 0.2 * kin.R_WT[:, 2], np.zeros(3))
         if np.linalg.svd(np.vstack([kin.Jv_WT, rcm.jacobian]), compute_uv=False)[-1] > 0.05:
             return q
@@ -42,6 +33,7 @@ def _trocar_point(kin: Kinematics, rng: np.random.Generator, rcm_error_m: float)
 
 
 def velocity_problem(
+    arm: ArmModel,
     seed: int,
     *,
     trocar: bool = True,
@@ -55,6 +47,7 @@ def velocity_problem(
     """A random velocity problem.
 
     Args:
+        arm: The arm.
         seed: Of the state and the command.
         trocar: Whether there is one.
         t_s: Time since the start [s].
@@ -62,19 +55,19 @@ def velocity_problem(
         rcm_error_m: Distance of the trocar point from the shaft [m].
         trocar_speed: Standard deviation of the trocar's velocity along each axis [m/s].
         speed: The same of the commanded tip velocity [m/s].
-        q: Joint positions (7,) [rad]; random ones by default.
+        q: Joint positions (n,) [rad]; random ones by default.
     """
     rng = np.random.default_rng(seed)
-    q = random_q(rng) if q is None else q
-    kin = arm().kinematics(q)
+    q = random_q(arm, rng) if q is None else q
+    kin = arm.kinematics(q)
     p_WC = _trocar_point(kin, rng, rcm_error_m) if trocar else np.full(3, np.nan)
     v_WC = trocar_speed * rng.standard_normal(3) if trocar else np.full(3, np.nan)
-    lower, upper = velocity_bounds(q, arm().limits, 10.0)
+    lower, upper = velocity_bounds(q, arm.limits, 10.0)
     return VelocityProblem(
         t_s=t_s,
         dt_s=dt_s,
         q=q,
-        v=0.1 * rng.standard_normal(7),
+        v=0.1 * rng.standard_normal(q.size),
         kin=kin,
         command=TipCommand(
             p_WTd=kin.p_WT + 0.001 * rng.standard_normal(3),
@@ -86,27 +79,27 @@ def velocity_problem(
         v_WC=v_WC,
         lower=lower,
         upper=upper,
-        limits=arm().limits,
+        limits=arm.limits,
         position_gain_per_s=10.0,
     )
 
 
-def torque_problem(seed: int, *, trocar: bool = True) -> TorqueProblem:
+def torque_problem(arm: ArmModel, seed: int, *, trocar: bool = True) -> TorqueProblem:
     """A random torque problem, on the state of the velocity problem of the same seed."""
-    p = velocity_problem(seed, trocar=trocar)
-    rng = np.random.default_rng(seed + 1000)
+    p = velocity_problem(arm, seed, trocar=trocar)
+    rng, n = np.random.default_rng(seed + 1000), p.q.size
     return TorqueProblem(
         t_s=0.1,
         dt_s=p.dt_s,
         q=p.q,
         v=p.v,
-        tau_measured=rng.standard_normal(7),
+        tau_measured=rng.standard_normal(n),
         kin=p.kin,
-        dyn=arm().dynamics(p.q, p.v),
+        dyn=arm.dynamics(p.q, p.v),
         rcm=p.rcm,
         p_WC=p.p_WC,
         v_WC=p.v_WC,
         command=p.command,
-        resolution=Resolution(qdot=0.1 * rng.standard_normal(7), residual=0.0),
-        q_ref=p.q + 0.01 * rng.standard_normal(7),
+        resolution=Resolution(qdot=0.1 * rng.standard_normal(n), residual=0.0),
+        q_ref=p.q + 0.01 * rng.standard_normal(n),
     )

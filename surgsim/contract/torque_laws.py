@@ -1,4 +1,4 @@
-"""What every torque law promises."""
+"""What every torque law promises, on each arm that has the redundancy that it needs."""
 
 from dataclasses import replace
 from typing import Any
@@ -6,15 +6,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from surgsim.contract.arms import arm_of, cases, on_every_arm
 from surgsim.contract.check import Check, require
-from surgsim.contract.problems import DT, arm, torque_problem
+from surgsim.contract.problems import DT, torque_problem
 from surgsim.control.torque_laws.base import TorqueProblem
+from surgsim.models.config import SceneConfig
 
 Array = NDArray[np.float64]
 
 
 def _rows(law: Any, problem: TorqueProblem) -> Array:
-    """Terms (3, terms, 7) at three ticks from a start [N m]."""
+    """Terms (3, terms, n) at three ticks from a start [N m]."""
     memory, rows = law.start(problem), []
     for k in range(3):
         terms, memory = law.torque(replace(problem, t_s=problem.t_s + k * DT), memory)
@@ -22,38 +24,43 @@ def _rows(law: Any, problem: TorqueProblem) -> Array:
     return np.array(rows)
 
 
-def finite(config: Any) -> None:
+@on_every_arm
+def finite(config: Any, scene: SceneConfig) -> None:
     """A finite row for every term, with and without a trocar, the same each time."""
-    for trocar in (True, False):
+    arm, part = arm_of(scene), config()
+    for trocar in cases(part, arm):
         for seed in range(3):
-            problem = torque_problem(seed, trocar=trocar)
-            law = config().build(arm())
+            problem = torque_problem(arm, seed, trocar=trocar)
+            law = part.build(arm)
             require(len(set(law.terms)) == len(law.terms) > 0, f"terms are none or named twice: {law.terms}")
-            first, shape = _rows(law, problem), (3, len(law.terms), 7)
+            first, shape = _rows(law, problem), (3, len(law.terms), problem.q.size)
             require(
                 first.shape == shape, f"the terms of three ticks have the shape {first.shape}, not {shape}"
             )
             require(np.isfinite(first).all(), "a term is not finite")
             require(np.abs(first.sum(axis=1)).max() > 1e-3, "the torque is nought")
             require(np.array_equal(_rows(law, problem), first), "the same problem gives other torques again")
-            new = _rows(config().build(arm()), problem)
+            new = _rows(config().build(arm), problem)
             require(np.array_equal(new, first), "a new object gives other torques")
 
 
-def rest(config: Any) -> None:
+@on_every_arm
+def rest(config: Any, scene: SceneConfig) -> None:
     """With no error and at rest, what is left is gravity."""
-    p, zero3, zero7 = torque_problem(4, trocar=False), np.zeros(3), np.zeros(7)
-    dyn = arm().dynamics(p.q, zero7)
+    arm = arm_of(scene)
+    p, zero = torque_problem(arm, 4, trocar=False), np.zeros(3)
+    still = np.zeros_like(p.q)
+    dyn = arm.dynamics(p.q, still)
     p = replace(
         p,
-        v=zero7,
+        v=still,
         dyn=dyn,
         tau_measured=dyn.bias,
-        command=replace(p.command, p_WTd=p.kin.p_WT, v_WTd=zero3, a_WTd=zero3),
-        resolution=replace(p.resolution, qdot=zero7),
+        command=replace(p.command, p_WTd=p.kin.p_WT, v_WTd=zero, a_WTd=zero),
+        resolution=replace(p.resolution, qdot=still),
         q_ref=p.q,
     )
-    law = config().build(arm())
+    law = config().build(arm)
     terms, _ = law.torque(p, law.start(p))
     apart = np.abs(np.asarray(terms).sum(axis=0) - dyn.bias).max()
     require(apart <= 1e-9, f"an arm at rest without error is given {apart:.3g} N m beside gravity")

@@ -17,6 +17,7 @@ from surgsim.control.failure import ControlFailure
 from surgsim.control.port_estimators import PORT_ESTIMATORS
 from surgsim.control.port_estimators.measured import MeasuredPortConfig
 from surgsim.control.problem import Resolution
+from surgsim.control.redundancy import check_redundancy
 from surgsim.control.resolvers import RESOLVERS
 from surgsim.control.torque_laws import TORQUE_LAWS
 from surgsim.models.arm import ArmModel
@@ -59,10 +60,10 @@ class ControlOutput:
     """What a controller commands at a tick.
 
     Attributes:
-        torque: Sum of the terms, not yet saturated (7,) [N m].
-        terms: Each term of the torque (len(terms), 7) [N m].
+        torque: Sum of the terms, not yet saturated (n,) [N m].
+        terms: Each term of the torque (len(terms), n) [N m].
         resolution: The resolver's answer.
-        q_ref: Joint reference (7,) [rad].
+        q_ref: Joint reference (n,) [rad].
         values: Values of the controller's own columns (k,).
     """
 
@@ -85,6 +86,9 @@ class Controller:
         has_trocar: Whether states carry a trocar.
         use_torque_law: False for the kinematic plant, which follows the resolver's velocities.
 
+    Raises:
+        SurgsimError: If a part needs more redundancy than the arm has, or cannot be built for it.
+
     Attributes:
         control: The record that `decide` works on.
         parts: Port estimator, resolver and torque law as their configs build them.
@@ -95,6 +99,9 @@ class Controller:
         self, config: ControllerConfig, arm: ArmModel, *, dt_s: float, has_trocar: bool, use_torque_law: bool
     ) -> None:
         self._config, self._arm, self._dt, self._has_trocar = config, arm, dt_s, has_trocar
+        used = (config.resolver, config.torque_law) if use_torque_law else (config.resolver,)
+        for part in used:
+            check_redundancy(part, arm, has_trocar)
         self._join(
             ControllerParts(
                 port=config.port.build(arm),

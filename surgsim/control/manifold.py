@@ -305,16 +305,15 @@ def is_inside(on: Manifold, q: Array, miss: float) -> bool:
 def climb_from(
     model: Model, on: Manifold, here: Array, mu: float, offset: Array, goal: Array
 ) -> tuple[bool, float, float]:
-    """`goal` (n,): the optimum uphill of `here` + `offset`, with the last joint, the roll, as it is `here`.
+    """`goal` (n,): the optimum uphill of `here` + `offset`.
 
     Returns:
         Whether it is inside the limits and can be reached from `here`, where mu is `mu`; the norm of what
         the constraints lack there [m]; and mu there.
     """
     n = here.size
-    for j in range(n - 1):
+    for j in range(n):
         goal[j] = min(max(here[j] + offset[j], on.low[j]), on.high[j])
-    goal[n - 1] = here[n - 1]
     ranked, miss, height = climb(model, on, goal, CLIMB_STEPS, CLIMB_TOLERANCE_RAD)
     counts = ranked and is_inside(on, goal, miss) and _can_reach(model, on, here, goal, 0.5 * min(mu, height))
     return counts, miss, height

@@ -9,15 +9,12 @@ Array = NDArray[np.float64]
 
 
 def least_velocity(J: Array, v: Array, qdot_0: Array | None = None) -> Array:
-    """The solution of J q' = v nearest to `qdot_0` (7,) [rad/s]: q' = pinv(J) v + (I - pinv(J) J) q'_0.
+    """The solution of J q' = v nearest to `qdot_0` (n,) [rad/s]: q' = pinv(J) v + (I - pinv(J) J) q'_0.
 
     Raises:
         numpy.linalg.LinAlgError: If J has lost rank.
     """
-    return _nearest(J, v, _ZERO if qdot_0 is None else qdot_0)
-
-
-_ZERO = np.zeros(7)
+    return _nearest(J, v, np.zeros(J.shape[1]) if qdot_0 is None else qdot_0)
 
 
 @compiled

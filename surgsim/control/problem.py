@@ -24,15 +24,15 @@ class VelocityProblem:
     Attributes:
         t_s: Time since the controller started [s].
         dt_s: Control period [s].
-        q: Joint positions at which the kinematics were evaluated (7,) [rad].
-        v: Joint velocities there (7,) [rad/s].
+        q: Joint positions at which the kinematics were evaluated (n,) [rad].
+        v: Joint velocities there (n,) [rad/s].
         kin: Kinematics at `q`.
         command: Desired tip motion.
         rcm: RCM error and Jacobian, or None without a trocar.
         p_WC: Trocar position (3,) [m]; NaN without one.
         v_WC: Trocar velocity (3,) [m/s]; zeros without one.
-        lower: Lower velocity bounds Omega (7,) [rad/s].
-        upper: Upper velocity bounds Omega (7,) [rad/s].
+        lower: Lower velocity bounds Omega (n,) [rad/s].
+        upper: Upper velocity bounds Omega (n,) [rad/s].
         limits: The arm's joint limits.
         position_gain_per_s: alpha of Omega [1/s].
     """
@@ -62,7 +62,7 @@ class Resolution:
     """A resolver's answer.
 
     Attributes:
-        qdot: Joint velocities inside the bounds (7,) [rad/s].
+        qdot: Joint velocities inside the bounds (n,) [rad/s].
         residual: Norm of the task and RCM rows that `qdot` leaves unmet [m/s].
         command: The tip motion that `qdot` follows, where that is not the task's, for the torque law.
         values: Values of the resolver's own columns (k,).
@@ -113,7 +113,7 @@ def braking_bounds(problem: VelocityProblem, last: Array) -> tuple[Array, Array]
 def stacked_rows(
     problem: VelocityProblem, k_tip: float, k_rcm: float, *, rcm: bool = True
 ) -> tuple[Array, Array]:
-    """Rows [J_T; J_rcm] (5, 7) and right side [v_d; v_rcm] (5,), eq. (20) of the VPRNN paper.
+    """Rows [J_T; J_rcm] (5, n) and right side [v_d; v_rcm] (5,), eq. (20) of the VPRNN paper.
 
     v_d = -k1 (p - p_d) + p_d', v_rcm = -k2 e + N C'. Without a trocar, or with `rcm` False, the three tip
     rows alone.

@@ -32,7 +32,7 @@ class Rcm:
 
     Attributes:
         error: e_N (2,) [m], in the directions `normals`.
-        jacobian: J_rcm (2, 7) [m/rad].
+        jacobian: J_rcm (2, n) [m/rad].
         trocar_velocity: N C' (2,) [m/s]; the error's rate is `jacobian @ v - trocar_velocity`.
         normals: N (2, 3), unit rows normal to the shaft.
         depth: Insertion depth s [m], negative while the tip is outside the patient.
@@ -98,7 +98,7 @@ def rcm_bias_acceleration(
 
     Args:
         kin: Kinematics.
-        v: Joint velocities (7,) [rad/s].
+        v: Joint velocities (n,) [rad/s].
         p_WC: Trocar position (3,) [m].
         v_WC: Trocar velocity (3,) [m/s].
         linear: Jv' v (3,) [m/s^2].
@@ -143,7 +143,7 @@ def fill_rcm_bias(
 
 
 def rcm_cross_form(kin: Kinematics, p_WC: Array) -> tuple[Array, Array]:
-    """E_rcm (3,) [m] of eq. (2) and its Jacobian (3, 7), which has rank 2 on the constraint.
+    """E_rcm (3,) [m] of eq. (2) and its Jacobian (3, n), which has rank 2 on the constraint.
 
     E = (C - r_wrist) x (p - r_wrist) / |p - r_wrist| = d x (p - C), so dE = [d]x Jv + [r]x [d]x Jw.
     """

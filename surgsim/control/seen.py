@@ -11,13 +11,12 @@ from numpy.typing import NDArray
 
 from surgsim.control.problem import VelocityProblem
 from surgsim.control.rcm import Rcm
-from surgsim.models.arm import ArmModel, Dynamics, Kinematics
+from surgsim.models.arm import RCM_ROWS, ArmModel, Dynamics, Kinematics
 from surgsim.models.build import JointLimits
 from surgsim.tasks.command import command_of, fill_command_of
 from surgsim.tick.arrays import Seen, new
 
 Array = NDArray[np.float64]
-RCM_ROWS = 2
 _blanks: WeakKeyDictionary[ArmModel, dict[tuple[float, bool, float], Any]] = WeakKeyDictionary()
 
 

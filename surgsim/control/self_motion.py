@@ -1,7 +1,8 @@
 """The self-motion manifold at a tip position, and the largest manipulability on it.
 
-Self-motion is all joint motion that moves neither the tip nor, with a trocar, the shaft axis. It has 2
-degrees with a trocar (elbow swivel and instrument roll, which leaves mu as it is) and 4 without.
+Self-motion is all joint motion that moves neither the tip nor, with a trocar, the shaft axis. It has n - 3
+degrees, n - 5 with a trocar. Of an arm of seven joints these are the elbow swivel and the instrument's roll,
+which leaves mu as it is.
 """
 
 from dataclasses import dataclass
@@ -110,7 +111,7 @@ class SelfMotion:
         first = self.climb(here.q, p_WT, p_WC)
         found = [first] if self.inside(first) else []
         on = self._on(p_WT, p_WC)
-        for offset in search_offsets(starts, here.q.size):
+        for offset in search_offsets(starts, self._arm):
             goal = np.empty(here.q.size)
             counts, miss, _ = climb_from(self._model, on, here.q, here.mu, offset, goal)
             if counts:
@@ -184,6 +185,12 @@ def elbow_swivel_rad(kin: Kinematics) -> float:
     return float(np.arctan2(cross(axis, up) @ out, up @ out))
 
 
-def search_offsets(starts: int, n: int) -> Array:
-    """Random joint displacements (starts, n) [rad] to begin a search from, the same ones every time."""
-    return np.random.default_rng(_SEARCH_SEED).normal(size=(starts, n))
+def search_offsets(starts: int, arm: ArmModel) -> Array:
+    """Random joint displacements (starts, n) [rad] to begin a search from, the same ones every time.
+
+    A last joint that only rolls the instrument stays: mu does not depend on it.
+    """
+    offsets = np.random.default_rng(_SEARCH_SEED).normal(size=(starts, arm.limits.q_min.size))
+    if arm.rolls_shaft:
+        offsets[:, -1] = 0.0
+    return offsets

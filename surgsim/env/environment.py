@@ -76,7 +76,7 @@ def load(
     Args:
         scenario: Path or shipped name of a scenario, or one that is loaded.
         action: `tip_velocity` (3) [m/s], which the resolver and the scenario's torque law turn into torques;
-            `joint_velocity` (7) [rad/s], which joint impedance does; or `torque` (7) [N m].
+            `joint_velocity` (n) [rad/s], which joint impedance does; or `torque` (n) [N m].
         resolver: Resolves tip velocities: a resolver's name or config; None: the scenario's own.
         decimation: Control ticks for which an action holds.
         seed: Of the sequence of episodes; None: the scenario's.

@@ -3,6 +3,7 @@
 `surgsim/Circle-LWR4Plus-v0` is the scenario `circle_lwr4plus`, and so on. Needs the extra `gymnasium`.
 """
 
+import re
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -19,7 +20,6 @@ from surgsim.scenario.schema import Scenario
 
 Array = NDArray[np.float64]
 Observation = dict[str, Any]
-_SPELLED = {"lwr4plus": "LWR4Plus"}
 
 
 class SurgsimEnv(gymnasium.Env[Observation, Any]):
@@ -114,8 +114,13 @@ class SurgsimEnv(gymnasium.Env[Observation, Any]):
 
 def environment_id(scenario: str) -> str:
     """Gymnasium's id of a shipped scenario."""
-    words = [_SPELLED.get(word, word.capitalize()) for word in scenario.split("_")]
-    return f"surgsim/{'-'.join(words)}-v0"
+    return f"surgsim/{'-'.join(map(_spelled, scenario.split('_')))}-v0"
+
+
+def _spelled(word: str) -> str:
+    """A word with a capital; letters before a number are an abbreviation."""
+    letters, number, rest = re.fullmatch(r"(\D*)(\d*)(.*)", word).groups()  # type: ignore[union-attr]
+    return f"{letters.upper()}{number}{rest.capitalize()}" if number else word.capitalize()
 
 
 def register() -> None:

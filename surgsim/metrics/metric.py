@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 from surgsim.trace.trace import Trace
 
-REPEATABILITY = "how well the arms come back to a pose (ISO 9283; data sheets: Panda 0.1 mm, LWR 4+ 0.05 mm)"
-FORCE_RESOLUTION = "the force resolution of the Panda (data sheet: 0.05 N)"
+REPEATABILITY = "how well the arms come back to a pose (ISO 9283; data sheets: 0.05 and 0.1 mm)"
+FORCE_RESOLUTION = "the force resolution of a torque-controlled arm (data sheet: 0.05 N)"
 CHOICE = "a choice of this project"
 
 

@@ -5,6 +5,7 @@ the payload, friction or inertia errors that a scenario gives the plant.
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import mujoco
@@ -13,8 +14,12 @@ from numpy.typing import NDArray
 
 from surgsim.models.build import JointLimits, Scene, build_arm
 from surgsim.models.config import SceneConfig
+from surgsim.spatial import cross
 
 Array = NDArray[np.float64]
+RCM_ROWS = 2
+"""Rows that hold the shaft in a trocar."""
+_ALONG = 1e-9  # m, rad
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -24,10 +29,10 @@ class Kinematics:
     Attributes:
         p_WT: Tip position (3,) [m].
         R_WT: Tip orientation (3, 3); its third column is the shaft axis, from adapter to tip.
-        Jv_WT: Translational tip Jacobian (3, 7) [m/rad].
-        Jw_WT: Rotational tip Jacobian (3, 7) [-].
-        z_W: Joint axes as rows (7, 3), unit.
-        anchors_W: Points on the joint axes as rows (7, 3) [m].
+        Jv_WT: Translational tip Jacobian (3, n) [m/rad].
+        Jw_WT: Rotational tip Jacobian (3, n) [-].
+        z_W: Joint axes as rows (n, 3), unit.
+        anchors_W: Points on the joint axes as rows (n, 3) [m].
     """
 
     p_WT: Array
@@ -43,8 +48,8 @@ class Dynamics:
     """Rigid-body dynamics at one state: M q'' + bias = tau - damping * v.
 
     Attributes:
-        mass_matrix: Joint-space inertia with armature (7, 7) [kg m^2].
-        bias: Coriolis, centrifugal and gravity torque (7,) [N m].
+        mass_matrix: Joint-space inertia with armature (n, n) [kg m^2].
+        bias: Coriolis, centrifugal and gravity torque (n,) [N m].
     """
 
     mass_matrix: Array
@@ -78,8 +83,23 @@ class ArmModel:
 
     @property
     def damping(self) -> Array:
-        """Viscous joint damping of the nominal model (7,) [N m s/rad]."""
+        """Viscous joint damping of the nominal model (n,) [N m s/rad]."""
         return np.array(self._model.dof_damping, dtype=float)
+
+    @cached_property
+    def rolls_shaft(self) -> bool:
+        """Whether the last joint turns about the shaft, and so moves neither tip nor shaft axis."""
+        kin = self.kinematics(0.5 * (self.limits.q_min + self.limits.q_max))
+        turned = cross(kin.z_W[-1], kin.R_WT[:, 2])
+        return bool(np.abs(turned).max() < _ALONG and np.abs(kin.Jv_WT[:, -1]).max() < _ALONG)
+
+    def redundancy(self, has_trocar: bool) -> int:
+        """Degrees of freedom that are left when the tip, and with a trocar the shaft, are held.
+
+        That is n - 3, two fewer with a trocar, and one fewer where the last joint rolls the shaft: the roll
+        is not counted, since it moves neither.
+        """
+        return int(self._model.nv) - 3 - RCM_ROWS * has_trocar - self.rolls_shaft
 
     def point(self, record: Any, *, shared: bool = False) -> None:
         """Let a `surgsim.tick.arrays.Model` record evaluate this arm, with data of its own or `shared` ones.
@@ -100,12 +120,12 @@ class ArmModel:
         record.damping[:] = self.damping
 
     def kinematics(self, q: Array) -> Kinematics:
-        """Kinematics at joint positions `q` (7,) [rad]."""
+        """Kinematics at joint positions `q` (n,) [rad]."""
         self._place(q)
         return self._read_kinematics()
 
     def dynamics(self, q: Array, v: Array) -> Dynamics:
-        """Dynamics at joint positions `q` (7,) [rad] and velocities `v` (7,) [rad/s]."""
+        """Dynamics at joint positions `q` (n,) [rad] and velocities `v` (n,) [rad/s]."""
         self._place(q)
         return self._read_dynamics(v)
 
@@ -120,7 +140,8 @@ class ArmModel:
         mujoco.mj_comPos(self._model, self._data)
 
     def _read_kinematics(self) -> Kinematics:
-        Jv, Jw = np.empty((3, 7)), np.empty((3, 7))
+        n = self._model.nv
+        Jv, Jw = np.empty((3, n)), np.empty((3, n))
         mujoco.mj_jacSite(self._model, self._data, Jv, Jw, self._scene.tip_site)
         return Kinematics(
             p_WT=self._tip.copy(),
@@ -132,7 +153,8 @@ class ArmModel:
         )
 
     def _read_dynamics(self, v: Array) -> Dynamics:
-        model, data, bias, M = self._model, self._data, np.empty(7), np.empty((7, 7))
+        model, data, n = self._model, self._data, self._model.nv
+        bias, M = np.empty(n), np.empty((n, n))
         data.qvel[:] = v
         mujoco.mj_comVel(model, data)
         mujoco.mj_rne(model, data, 0, bias)

@@ -13,7 +13,7 @@ from surgsim.models.collision import CollisionShapes, collision_shapes
 from surgsim.models.config import RobotConfig, SceneConfig, WallConfig
 from surgsim.models.graft import graft
 from surgsim.models.instrument import attach_instrument
-from surgsim.models.robot import JOINTS, MOTORS, JointLimits, robot_spec
+from surgsim.models.robot import JointLimits, joint_names, motor_names, robot_spec
 from surgsim.models.theatre import (
     CANNULA_JOINTS,
     GRAVITY_M_PER_S2,
@@ -41,9 +41,9 @@ class Scene:
 
     Attributes:
         model: The compiled MuJoCo model.
-        qpos_ids: Where the arm's positions are in `qpos` (7,).
-        dof_ids: Where its velocities are in `qvel` (7,).
-        actuator_ids: Where its motors are in `ctrl` (7,).
+        qpos_ids: Where the arm's positions are in `qpos` (n,).
+        dof_ids: Where its velocities are in `qvel` (n,).
+        actuator_ids: Where its motors are in `ctrl` (n,).
         flange_site: Flange, z along the tool.
         tip_site: Instrument tip, z along the shaft; the flange without an instrument.
         shaft_entry_site: Start of the shaft, a second point of its axis; the wrist without an instrument.
@@ -133,13 +133,13 @@ def _compile(spec: mujoco.MjSpec, config: SceneConfig) -> Scene:
     model = spec.compile()
     wall = None if config.trocar is None else config.trocar.wall
     slides = [] if wall is None else [model.joint(name) for name in CANNULA_JOINTS]
-    joints = [model.joint(name) for name in JOINTS]
+    joints = [model.joint(name) for name in joint_names(model)]
     port = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, "port")
     return Scene(
         model=model,
         qpos_ids=_ids([joint.qposadr[0] for joint in joints]),
         dof_ids=_ids([joint.dofadr[0] for joint in joints]),
-        actuator_ids=_ids([model.actuator(name).id for name in MOTORS]),
+        actuator_ids=_ids([model.actuator(name).id for name in motor_names(len(joints))]),
         flange_site=model.site("flange").id,
         tip_site=model.site("tip").id,
         shaft_entry_site=model.site("shaft_entry").id,

@@ -1,7 +1,7 @@
 """Shapes between which forbidden contacts are looked for: capsules along the arm, patient and table.
 
 They are no geoms of the model: they are seen, exert no force and are not drawn, and they are there whether
-the theatre is drawn or not. Capsules lie inside or close to the drawn links, the patient is the drawn
+the theatre is drawn or not. The robot's folder says where its links' capsules are; the patient is the drawn
 abdomen's ellipsoid, the table a box.
 """
 
@@ -14,35 +14,11 @@ from numpy.typing import NDArray
 
 from surgsim.models.config import SceneConfig
 from surgsim.models.graft import asset
+from surgsim.models.robot import joint_names, link_names
 from surgsim.models.theatre import patient_place
 
 Array = NDArray[np.float64]
 Ids = NDArray[np.intp]
-Capsule = tuple[tuple[float, float, float], tuple[float, float, float], float]
-
-_LWR4PLUS: tuple[Capsule, ...] = (
-    ((0.0, 0.0, 0.03), (0.0, 0.0, 0.10), 0.085),
-    ((0.0, 0.0, -0.15), (0.0, 0.0, 0.0), 0.066),
-    ((0.0, 0.0, 0.0), (0.0, 0.0, 0.14), 0.066),
-    ((0.0, 0.0, -0.14), (0.0, 0.0, 0.0), 0.066),
-    ((0.0, 0.0, 0.0), (0.0, 0.0, 0.14), 0.066),
-    ((0.0, 0.0, -0.13), (0.0, 0.0, 0.0), 0.055),
-    ((0.0, 0.0, -0.01), (0.0, 0.0, 0.01), 0.055),
-    ((0.0, 0.0, 0.03), (0.0, 0.0, 0.04), 0.038),
-)
-_PANDA: tuple[Capsule, ...] = (
-    ((0.0, 0.0, 0.03), (0.0, 0.0, 0.10), 0.085),
-    ((0.0, 0.0, -0.14), (0.0, 0.0, 0.0), 0.059),
-    ((0.0, 0.0, 0.0), (0.0, -0.14, 0.0), 0.059),
-    ((0.0, 0.0, -0.08), (0.0825, 0.0, 0.0), 0.055),
-    ((0.0, 0.0, 0.0), (-0.0825, 0.08, 0.0), 0.055),
-    ((0.0, 0.0, -0.21), (0.0, 0.0, 0.0), 0.052),
-    ((0.0, 0.0, 0.0), (0.088, 0.0, 0.0), 0.049),
-    ((0.0, 0.0, 0.0), (0.0, 0.0, 0.062), 0.045),
-)
-LINKS = ("base", *(f"link{i}" for i in range(1, 8)))
-_ARMS = {"lwr4plus": _LWR4PLUS, "panda": _PANDA}
-"""End points [m] in the body's frame and radius [m] of each of `LINKS`."""
 _ADAPTER_RADIUS_M = 0.026
 _NEXT_THAT_CAN_TOUCH = 3  # along the chain: nearer ones are held apart by the joints' ranges
 _TABLE_CENTRE_M, _TABLE_HALF_M = (0.0, -0.13, -0.223), (0.268, 0.98, 0.054)  # pads and top of the drawn table
@@ -75,29 +51,40 @@ class CollisionShapes:
 
 def collision_shapes(model: mujoco.MjModel, config: SceneConfig) -> CollisionShapes:
     """Shapes of the scene that `model` was compiled from."""
-    capsules = {name: (name, *capsule) for name, capsule in zip(LINKS, _ARMS[config.robot.name], strict=True)}
+    joints = len(joint_names(model))
+    capsules = {name: (name, *_capsule(model, name)) for name in ("base", *link_names(joints))}
     if config.instrument is not None:
         entry, tip = config.instrument.adapter_length_m, config.instrument.shaft_length_m
         tip += entry
         below = (0.0, 0.0, max(0.0, entry - _ADAPTER_RADIUS_M))
-        capsules["adapter"] = ("instrument", (0.0, 0.0, 0.0), below, _ADAPTER_RADIUS_M)
+        capsules["adapter"] = ("instrument", np.zeros(3), np.array(below), _ADAPTER_RADIUS_M)
         radius = 0.5 * config.instrument.shaft_diameter_m
-        capsules["shaft"] = ("instrument", (0.0, 0.0, entry), (0.0, 0.0, tip - radius), radius)
+        ends = np.array([0.0, 0.0, entry]), np.array([0.0, 0.0, tip - radius])
+        capsules["shaft"] = ("instrument", *ends, radius)
     names = tuple(capsules)
     return CollisionShapes(
         names=names,
         bodies=np.array([model.body(body).id for body, *_ in capsules.values()], dtype=np.intp),
         ends=np.array([[one, other] for _, one, other, _ in capsules.values()]),
         radii=np.array([radius for *_, radius in capsules.values()]),
-        pairs=_pairs(names),
+        pairs=_pairs(names, joints),
         shaft=names.index("shaft") if "shaft" in names else -1,
         patient=_patient(config),
     )
 
 
-def _pairs(names: tuple[str, ...]) -> Ids:
-    """Capsules that are far enough apart along the chain; the bent wrist holds the adapter beside link 5."""
-    count, near = len(names), {("link5", "adapter")}
+def _capsule(model: mujoco.MjModel, body: str) -> tuple[Array, Array, float]:
+    """End points (3,) [m] in the body's frame and radius [m] of the capsule of an arm's body."""
+    numbers = model.numeric(f"capsule_{body}").data
+    return numbers[:3], numbers[3:6], float(numbers[6])
+
+
+def _pairs(names: tuple[str, ...], joints: int) -> Ids:
+    """Capsules that are far enough apart along the chain.
+
+    The bent wrist holds the adapter beside the link above it, the third from the end.
+    """
+    count, near = len(names), {(f"link{joints - 2}", "adapter")}
     pairs = [(i, j) for i in range(count) for j in range(i + _NEXT_THAT_CAN_TOUCH, count)]
     return np.array([pair for pair in pairs if (names[pair[0]], names[pair[1]]) not in near], dtype=np.intp)
 

@@ -1,23 +1,33 @@
 """What a scene is made of."""
 
 import math
+from dataclasses import dataclass
 from typing import Annotated, Literal, Self
 
-from pydantic import Field, FiniteFloat, NonNegativeFloat, PositiveFloat, model_validator
+from pydantic import AfterValidator, Field, FiniteFloat, NonNegativeFloat, PositiveFloat, model_validator
 
 from surgsim.catalog import PartConfig
+from surgsim.models.robot import known_robot, with_literal_variant
 
 Vec3 = tuple[FiniteFloat, FiniteFloat, FiniteFloat]
-Vec7 = tuple[FiniteFloat, FiniteFloat, FiniteFloat, FiniteFloat, FiniteFloat, FiniteFloat, FiniteFloat]
-RobotName = Literal["lwr4plus", "panda"]
+
+
+@dataclass(frozen=True)
+class ForEachJoint:
+    """Marks a list of a config that has one item for each joint of the scenario's robot."""
+
+
+PerJoint = Annotated[tuple[FiniteFloat, ...], ForEachJoint()]
+"""A number for each joint, from the base on (n,)."""
+RobotName = Annotated[str, AfterValidator(known_robot)]
 
 
 class RobotConfig(PartConfig):
     """Which arm, and where its base stands in the world.
 
     Attributes:
-        dh_variant: `literal` takes d2 = 0.2 m of the LWR4+ as Table 3 of the manipulability paper prints it,
-            a misprint (the arm has 0): for studies of that paper alone.
+        dh_variant: `literal` takes d2 as Table 3 of the manipulability paper prints it, a misprint: for
+            studies of that paper and its arm alone.
     """
 
     name: RobotName
@@ -27,8 +37,8 @@ class RobotConfig(PartConfig):
 
     @model_validator(mode="after")
     def _variant_exists(self) -> Self:
-        if self.dh_variant == "literal" and self.name != "lwr4plus":
-            raise ValueError(f"dh_variant 'literal' is of 'lwr4plus' alone, not of '{self.name}'")
+        if self.dh_variant == "literal" and self.name not in (known := with_literal_variant()):
+            raise ValueError(f"dh_variant 'literal' is of '{', '.join(known)}' alone, not of '{self.name}'")
         return self
 
 

@@ -15,12 +15,12 @@ def attach_instrument(arm: mujoco.MjSpec, config: InstrumentConfig | None) -> No
     """Put the instrument on site `flange` of `arm`, with sites `shaft_entry` and `tip`.
 
     Both sites have z along the shaft, towards the tip. `shaft_entry` is the end of the adapter. Without an
-    instrument `tip` is the flange and `shaft_entry` the wrist centre (the origin of link7).
+    instrument `tip` is the flange and `shaft_entry` the wrist centre (the origin of the last link).
     """
     if config is None:
         flange = arm.site("flange")
-        arm.body("link7").add_site(name="shaft_entry", quat=flange.quat, group=4)
-        arm.body("link7").add_site(name="tip", pos=flange.pos, quat=flange.quat, group=4)
+        flange.parent.add_site(name="shaft_entry", quat=flange.quat, group=4)
+        flange.parent.add_site(name="tip", pos=flange.pos, quat=flange.quat, group=4)
     else:
         graft(arm, instrument_spec(config), site=arm.site("flange"))
 

@@ -15,7 +15,7 @@ def render(
 
     Args:
         scene: From `build`, with its theatre.
-        q: Joint positions (7,) [rad].
+        q: Joint positions (n,) [rad].
         camera: Name of a camera in the scene.
         width: Pixels.
         height: Pixels.

@@ -4,8 +4,8 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from surgsim.columns import Block, scalar, vector
-from surgsim.models.robot import JOINTS
+from surgsim.columns import AXES, Block, scalar, vector
+from surgsim.models.robot import joint_names
 
 Array = NDArray[np.float64]
 QUATERNION = ("w", "x", "y", "z")
@@ -19,14 +19,15 @@ def joint_columns(model: mujoco.MjModel) -> tuple[tuple[Block, ...], NDArray[np.
     """
     blocks: list[Block] = []
     places: list[int] = []
+    arm = joint_names(model)
     for i in range(model.njnt):
         name = model.joint(i).name
-        if name in JOINTS:
+        if name in arm:
             continue
         kind, first = model.jnt_type[i], int(model.jnt_qposadr[i])
         if kind == mujoco.mjtJoint.mjJNT_FREE:
             blocks += [vector(name, "m"), Block(f"{name}_quat", QUATERNION, "")]
-            places += range(first, first + 7)
+            places += range(first, first + len(AXES) + len(QUATERNION))
         else:
             blocks.append(scalar(name, "m" if kind == mujoco.mjtJoint.mjJNT_SLIDE else "rad"))
             places.append(first)

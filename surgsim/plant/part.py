@@ -70,7 +70,7 @@ class PlantPart:
         """
 
     def actuate(self, torque: Array) -> Array:
-        """Torque (7,) [N m] that reaches the joints in this period, given the one commanded; once a tick."""
+        """Torque (n,) [N m] that reaches the joints in this period, given the one commanded; once a tick."""
         return torque
 
     def grip(self, jaw: float) -> None:

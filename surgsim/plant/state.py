@@ -16,9 +16,9 @@ class State:
 
     Attributes:
         t_s: Time since the reset [s].
-        q: Joint positions (7,) [rad].
-        v: Joint velocities (7,) [rad/s].
-        tau: Joint torques that the actuators gave over the last period (7,) [N m].
+        q: Joint positions (n,) [rad].
+        v: Joint velocities (n,) [rad/s].
+        tau: Joint torques that the actuators gave over the last period (n,) [N m].
         p_WC: Trocar position, world frame (3,) [m]; NaN without a trocar.
         v_WC: Trocar velocity as announced to the controller (3,) [m/s]; zeros where nobody announces it.
         f_T: Force of the surroundings on the tip, as a sensor at the tip measures it, world frame (3,) [N].

@@ -33,8 +33,8 @@ class Truth:
     """True motion of arm, instrument and port, world frame.
 
     Attributes:
-        q: Joint positions (7,) [rad].
-        v: Joint velocities (7,) [rad/s].
+        q: Joint positions (n,) [rad].
+        v: Joint velocities (n,) [rad/s].
         p_WT: Tip (3,) [m].
         p_WR: Wrist: the shaft's second point (3,) [m].
         p_WC: Trocar: the incision at rest, breathing included (3,) [m]; NaN without one.
@@ -56,7 +56,7 @@ class Truth:
 
 
 def arm_view(values: Array, ids: NDArray[np.intp]) -> Array:
-    """The arm's part of one of MuJoCo's vectors, not copied; its seven entries follow each other."""
+    """The arm's part of one of MuJoCo's vectors, not copied; its n entries follow each other."""
     first = int(ids[0])
     if not np.array_equal(ids, np.arange(first, first + len(ids))):
         raise ValueError(f"the arm's entries {ids} do not follow each other")

@@ -20,7 +20,7 @@ def blueprint(scenario: Scenario, trace: Trace) -> rrb.Blueprint:
         *tabs_of(added_plots(trace)),
         texts_view(),
     )
-    right = rrb.Vertical(*joint_plots(trace), joint_key(), row_shares=[0.31, 0.31, 0.31, 0.07])
+    right = rrb.Vertical(*joint_plots(trace), joint_key(trace.joints), row_shares=[0.31, 0.31, 0.31, 0.07])
     return laid_out(rrb.Horizontal(left, middle, right, column_shares=[0.4, 0.31, 0.29]))
 
 

@@ -11,7 +11,7 @@ from surgsim.columns import Block
 from surgsim.trace.trace import Array, Trace, TraceMeta
 
 APPLICATION = "surgsim"
-SCHEMA_VERSION = 2
+SCHEMA_VERSION = 3
 TIMELINE = "sim_time"
 FILE_NAME = "recording.rrd"
 HEADER = "surgsim"
@@ -80,7 +80,7 @@ class Header:
 
     def to_texts(self) -> dict[str, str]:
         """The header as named texts."""
-        blocks = [[block.name, list(block.labels), block.unit] for block in self.blocks]
+        blocks = [[block.name, list(block.labels), block.unit, block.joiner] for block in self.blocks]
         return {
             "schema_version": str(SCHEMA_VERSION),
             "trace_meta": self.meta.to_json(),
@@ -102,7 +102,10 @@ class Header:
             return Header(
                 meta=TraceMeta.from_json(texts["trace_meta"]),
                 metrics={str(k): None if v is None else float(v) for k, v in metrics.items()},
-                blocks=tuple(Block(str(n), tuple(map(str, ls)), str(u)) for n, ls, u in layout["blocks"]),
+                blocks=tuple(
+                    Block(str(name), tuple(map(str, labels)), str(unit), str(joiner))
+                    for name, labels, unit, joiner in layout["blocks"]
+                ),
                 rows=int(layout["rows"]),
             )
         except (KeyError, TypeError, AttributeError, ValueError) as error:

@@ -99,7 +99,7 @@ def _column(
             plot("Manipulability", f"{below}{series_path('manipulability')}", axis_y=manipulability),
             joint_plots(trace, below)[-1],
         ),
-        joint_key(below),
+        joint_key(trace.joints, below),
         texts_view(below),
         row_shares=[0.42, 0.27, 0.07, 0.24],
     )

@@ -8,6 +8,8 @@ BLUE = (0, 114, 178)
 VERMILION = (213, 94, 0)
 PINK = (204, 121, 167)
 BLACK = (12, 12, 12)
+OLIVE = (153, 153, 51)
 GREY = (150, 150, 150)
 
-SEVEN = (ORANGE, SKY, GREEN, YELLOW, BLUE, VERMILION, PINK)
+SERIES = (ORANGE, SKY, GREEN, YELLOW, BLUE, VERMILION, PINK, OLIVE)
+"""Of the joints and other series of a plot, in turn; olive is of Paul Tol's muted scheme."""

@@ -5,7 +5,7 @@ import rerun.blueprint as rrb
 
 from surgsim.columns import Block
 from surgsim.recording.layout import ERRORS, KEY, LIMITS, series_path
-from surgsim.trace.trace import BASE_BLOCKS, Trace
+from surgsim.trace.trace import Trace, base_blocks
 
 _TERM = "tau_"
 _TITLES = {
@@ -70,12 +70,12 @@ def _terms(trace: Trace, below: str) -> list[rrb.TimeSeriesView]:
     ]
 
 
-def joint_key(below: str = "") -> rrb.Spatial2DView:
+def joint_key(joints: int, below: str = "") -> rrb.Spatial2DView:
     """Which colour is which joint, once for all plots."""
     return rrb.Spatial2DView(
-        name="Joints 1 to 7",
+        name=f"Joints 1 to {joints}",
         origin=f"/{below}{KEY}",
-        visual_bounds=rrb.VisualBounds2D(x_range=(0.4, 7.6), y_range=(-0.3, 0.5)),
+        visual_bounds=rrb.VisualBounds2D(x_range=(0.4, joints + 0.6), y_range=(-0.3, 0.5)),
     )
 
 
@@ -135,7 +135,7 @@ def groups(trace: Trace) -> dict[str, list[Block]]:
 
 
 def _added(trace: Trace) -> list[Block]:
-    return [block for block in trace.blocks[len(BASE_BLOCKS) :] if varies(trace, block.name)]
+    return [block for block in trace.blocks[len(base_blocks(trace.joints)) :] if varies(trace, block.name)]
 
 
 def varies(trace: Trace, block: str) -> bool:

@@ -13,7 +13,7 @@ from surgsim.errors import RecordingError
 from surgsim.recording.framing import check_framing, recording_file
 from surgsim.recording.layout import Header
 from surgsim.resources import run_module
-from surgsim.trace.trace import BASE_BLOCKS, Array, Trace
+from surgsim.trace.trace import Array, Trace, base_blocks
 
 _TIMEOUT_S = 120.0
 
@@ -49,7 +49,8 @@ def read_recording(path: str | os.PathLike[str]) -> Recorded:
 def _fault(header: Header) -> str:
     """What every run has and this one has not, or nothing."""
     found = {name for block in header.blocks for name in block.columns}
-    missing = [name for block in BASE_BLOCKS for name in block.columns if name not in found]
+    joints = max((len(block.labels) for block in header.blocks if block.name == "q"), default=1)
+    missing = [name for block in base_blocks(joints) for name in block.columns if name not in found]
     if missing:
         return f"it has no column '{missing[0]}'"
     scenario = header.meta.scenario

@@ -33,7 +33,7 @@ def log_signals(stream: rr.RecordingStream, trace: Trace) -> None:
     errors = 1e3 * np.stack([trace["tip_error_m"], trace["rcm_error_m"]], axis=1)
     _draw(stream, ERRORS, times, errors, names=["tip", "RCM"], colors=[palette.SKY, palette.ORANGE])
     _log_limits(stream, trace)
-    _log_key(stream)
+    _log_key(stream, trace.joints)
 
 
 def _draw(
@@ -75,20 +75,20 @@ def _names(block: Block) -> list[str]:
 
 def series_colors(trace: Trace) -> dict[str, list[tuple[int, int, int]]]:
     """Colours of every block's series; those that share a plot take turns."""
-    found = {block.name: [*islice(cycle(palette.SEVEN), len(block.labels))] for block in trace.blocks}
+    found = {block.name: [*islice(cycle(palette.SERIES), len(block.labels))] for block in trace.blocks}
     found |= {name: [palette.SKY] for name, colors in found.items() if len(colors) == 1} | _SCALAR_COLORS
     for blocks in groups(trace).values():
-        turn = cycle(palette.SEVEN)
+        turn = cycle(palette.SERIES)
         found |= {block.name: [*islice(turn, len(block.labels))] for block in blocks}
     return found
 
 
-def _log_key(stream: rr.RecordingStream) -> None:
+def _log_key(stream: rr.RecordingStream, count: int) -> None:
     """A point and a number for every joint, in its colour."""
-    joints = range(1, len(palette.SEVEN) + 1)
+    joints = range(1, count + 1)
     points = rr.Points2D(
         [(joint, 0.0) for joint in joints],
-        colors=palette.SEVEN,
+        colors=[*islice(cycle(palette.SERIES), count)],
         labels=[str(joint) for joint in joints],
         radii=rr.Radius.ui_points(5.0),
         show_labels=True,

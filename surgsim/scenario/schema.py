@@ -9,12 +9,13 @@ from pydantic import Field, NonNegativeInt, PositiveFloat, model_validator
 
 from surgsim.catalog import Name, PartConfig
 from surgsim.control.controller import ControllerConfig
-from surgsim.models.config import InstrumentConfig, RobotConfig, SceneConfig, TrocarConfig, Vec7
+from surgsim.models.config import InstrumentConfig, PerJoint, RobotConfig, SceneConfig, TrocarConfig
 from surgsim.plant import PLANTS
 from surgsim.plant.disturbances import DISTURBANCES
 from surgsim.plant.dynamic import DynamicPlantConfig
 from surgsim.plant.part import PlantPart
 from surgsim.plant.props import PROPS
+from surgsim.scenario.per_joint import check_lists
 from surgsim.scenario.thresholds import ThresholdsConfig
 from surgsim.tasks import TASKS
 
@@ -32,8 +33,8 @@ class StartConfig(PartConfig):
         posture_rad: Posture near which the solution is sought; null: the robot's own.
     """
 
-    q_rad: Vec7 | None = None
-    posture_rad: Vec7 | None = None
+    q_rad: PerJoint | None = None
+    posture_rad: PerJoint | None = None
 
 
 class SimulationConfig(PartConfig):
@@ -117,8 +118,8 @@ class Scenario(PartConfig):
     Example:
         >>> import surgsim
         >>> scenario = surgsim.load("circle_lwr4plus")
-        >>> scenario.robot.name, scenario.task.radius_m, scenario.simulation.control_period_s
-        ('lwr4plus', 0.02, 0.001)
+        >>> scenario.task.type, scenario.task.radius_m, scenario.simulation.control_period_s
+        ('circle', 0.02, 0.001)
     """
 
     schema_version: Literal[1] = 1
@@ -139,6 +140,11 @@ class Scenario(PartConfig):
     safety: SafetyConfig = SafetyConfig()
     thresholds: ThresholdsConfig = ThresholdsConfig()
     recording: RecordingConfig = RecordingConfig()
+
+    @model_validator(mode="after")
+    def _fits_the_arm(self) -> Self:
+        check_lists(self, self.robot.name)
+        return self
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:

@@ -116,6 +116,8 @@ def _locate(model: type[M], tree: Any, item: Mapping[str, Any]) -> Problem:
     shape, parent, value, holder = unwrap(model), Shape(core=Any), tree, None
     path: list[str | int] = []
     code: str = item["type"]
+    if "at" in item.get("ctx", {}):  # a check of the whole that knows the key it is about
+        return _placed(model, tree, item)
     for index, key in enumerate(item["loc"], start=1):
         if shape.tag and key in shape.members():
             shape = replace(shape.members()[str(key)], notes=shape.notes)
@@ -146,6 +148,21 @@ def _locate(model: type[M], tree: Any, item: Mapping[str, Any]) -> Problem:
     )
 
 
+def _placed(model: type[PartConfig], tree: Any, item: Mapping[str, Any]) -> Problem:
+    """The problem of a check that says its place and its words itself."""
+    shape = unwrap(model)
+    return Problem(
+        path=(*item["loc"], *item["ctx"]["at"]),
+        code=item["type"],
+        shape=shape,
+        parent=shape,
+        value=tree,
+        holder=tree,
+        message=item["msg"],
+        context=item["ctx"],
+    )
+
+
 def _get(value: Any, key: str | int) -> Any:
     if isinstance(value, dict):
         return value.get(str(key), _ABSENT)
@@ -170,6 +187,8 @@ def _word(problem: Problem) -> str:
             return _not_a(problem, list(problem.shape.choices()))
         case "value_error" | "assertion_error" if "error" in problem.context:
             return one_line(" ".join(str(problem.context["error"]).split()), _LONGEST)
+        case "per_joint":
+            return problem.message
         case "too_short" | "too_long" if isinstance(problem.value, list):
             return _wrong_length(problem)
     if problem.code.endswith(("_type", "_parsing")) or problem.code == "int_from_float":

@@ -10,6 +10,8 @@ import annotated_types
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
+from surgsim.models.config import ForEachJoint
+
 _NOUNS: dict[Any, tuple[str, str]] = {
     float: ("a number", "numbers"),
     int: ("an integer", "integers"),
@@ -172,6 +174,8 @@ class Shape:
         plural = _NOUNS[item.core][1] if item.core in (float, int, bool, str) else "items"
         if item.title:
             plural = f"mappings, each a {item.title}"
+        if any(isinstance(note, ForEachJoint) for note in self.notes):
+            plural = f"{plural}, one for each joint"
         return f"a list of {len(args)} {plural}" if self.is_fixed else f"a list of {plural}"
 
 

@@ -43,7 +43,7 @@ from surgsim.tasks.binding import BoundTask
 from surgsim.tasks.command import command_of
 from surgsim.tick.arrays import Control, Record, World, new, point
 from surgsim.tick.status import GOES_ON
-from surgsim.trace.trace import BASE_BLOCKS, Ending, Trace, TraceMeta
+from surgsim.trace.trace import Ending, Trace, TraceMeta, base_blocks
 
 Array = NDArray[np.float64]
 Progress = Callable[[float, float], None]
@@ -79,15 +79,15 @@ class Simulation:
         self._safety = SafetyMonitor(scenario.safety, setup.scene.limits, scenario.trocar is not None, tear)
         self._stop_ticks = round((scenario.safety.stop or _NO_STOP).duration_s / self._period)
         last = math.ceil(setup.task.duration_s / self._period - 1e-6)
+        n = setup.arm.limits.q_min.size
         groups = {
-            "terms": tuple(joints(f"tau_{term}_", "nm") for term in setup.controller.terms),
+            "terms": tuple(joints(f"tau_{term}_", "nm", n) for term in setup.controller.terms),
             "task": setup.task.columns,
             "controller": setup.controller.columns,
             "plant": plant.columns,
         }
-        self._rows = Rows(BASE_BLOCKS, groups, last + 1 + self._stop_ticks, setup.arm)
+        self._rows = Rows(base_blocks(n), groups, last + 1 + self._stop_ticks, setup.arm)
         self._task = BoundTask(setup.task, setup.controller.control.command)
-        n = setup.arm.limits.q_min.size
         self._stop = new_stop(scenario.safety.stop or StopConfig(), setup.arm)
         self._run = self._wire(last)
         self._run_ticks = as_parameter(run_ticks, run_signature(n))

@@ -32,7 +32,7 @@ class Setup:
         task: Desired tip motion.
         plant: The plant, before its first reset.
         controller: The controller, before its first tick.
-        q_start: Start configuration (7,) [rad].
+        q_start: Start configuration (n,) [rad].
     """
 
     scenario: Scenario
@@ -159,7 +159,7 @@ def _start_key(scenario: Scenario) -> str:
 
 @lru_cache(maxsize=256)
 def _start_of(scenario_json: str) -> Array:
-    """Start configuration (7,) [rad], with the path checked; found once for the runs of a batch."""
+    """Start configuration (n,) [rad], with the path checked; found once for the runs of a batch."""
     scenario = Scenario.model_validate_json(scenario_json)
     arm = ArmModel(scenario.scene)
     p_WC = None if scenario.trocar is None else np.array(scenario.trocar.position_m)

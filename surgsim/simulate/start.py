@@ -48,7 +48,7 @@ class Reach:
             self._rows[0].target = p_WC
 
     def solve(self, p_WT: Array, q: Array, posture: Array, iterations: int) -> Array:
-        """Joint positions (7,) [rad] near `q` whose tip is at `p_WT` (3,) [m], by repeated mink steps.
+        """Joint positions (n,) [rad] near `q` whose tip is at `p_WT` (3,) [m], by repeated mink steps.
 
         The hard rows are dropped in a step in which they cannot be met inside the joint limits, so the
         result must be checked with `miss`.
@@ -97,7 +97,7 @@ class Reach:
 
 
 def solve_start(reach: Reach, arm: ArmModel, p_WT: Array, posture: Array) -> Array:
-    """Start configuration (7,) [rad]: tip at `p_WT`, shaft through the trocar, near `posture`.
+    """Start configuration (n,) [rad]: tip at `p_WT`, shaft through the trocar, near `posture`.
 
     Tries the posture and then turned copies of it.
 

@@ -126,7 +126,7 @@ def _remove(K: Array, R: Array, q: int, at: int, active: Ids, b: Array, multipli
         active[c], b[c], multiplier[c] = active[c + 1], b[c + 1], multiplier[c + 1]
         for i in range(c + 2):
             R[i, c] = R[i, c + 1]
-        h = math.hypot(R[c, c], R[c + 1, c])
+        h = math.sqrt(R[c, c] * R[c, c] + R[c + 1, c] * R[c + 1, c])
         cosine, sine = R[c, c] / h, R[c + 1, c] / h
         R[c, c], R[c + 1, c] = h, 0.0
         for j in range(c + 2, q):

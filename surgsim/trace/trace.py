@@ -19,29 +19,33 @@ Array = NDArray[np.float64]
 TIMING_COLUMNS = ("control_time_s",)
 """Columns that measure the machine, not the experiment: they differ between two equal runs."""
 
-BASE_BLOCKS = (
-    scalar("t", "s"),
-    joints("q", "rad"),
-    joints("v", "rad_per_s"),
-    joints("tau", "nm"),
-    joints("qdot_ref", "rad_per_s"),
-    joints("q_ref", "rad"),
-    vector("tip", "m"),
-    vector("tip_ref", "m"),
-    vector("wrist", "m"),
-    vector("trocar", "m"),
-    scalar("tip_error", "m"),
-    scalar("rcm_error", "m"),
-    scalar("manipulability"),
-    scalar("manipulability_6d"),
-    scalar("resolver_residual", "m_per_s"),
-    scalar("saturated_joints"),
-    scalar("control_time", "s"),
-    scalar("infeasible"),
-    scalar("stopped"),
-)
-"""Columns that every trace has. `tau_<term>` blocks, one per term of the torque law, follow, then what task,
-controller and plant add."""
+
+def base_blocks(n: int) -> tuple[Block, ...]:
+    """Columns that every trace of an arm of n joints has.
+
+    `tau_<term>` blocks, one per term of the torque law, follow, then what task, controller and plant add.
+    """
+    return (
+        scalar("t", "s"),
+        joints("q", "rad", n),
+        joints("v", "rad_per_s", n),
+        joints("tau", "nm", n),
+        joints("qdot_ref", "rad_per_s", n),
+        joints("q_ref", "rad", n),
+        vector("tip", "m"),
+        vector("tip_ref", "m"),
+        vector("wrist", "m"),
+        vector("trocar", "m"),
+        scalar("tip_error", "m"),
+        scalar("rcm_error", "m"),
+        scalar("manipulability"),
+        scalar("manipulability_6d"),
+        scalar("resolver_residual", "m_per_s"),
+        scalar("saturated_joints"),
+        scalar("control_time", "s"),
+        scalar("infeasible"),
+        scalar("stopped"),
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -96,7 +100,7 @@ class TraceMeta:
     Attributes:
         scenario: The resolved scenario.
         control_period_s: Time between rows [s].
-        limits: Joint limits: q_min, q_max, velocity, acceleration, torque, lists of seven, SI.
+        limits: Joint limits: q_min, q_max, velocity, acceleration, torque, a number for each joint, SI.
         ending: How the run ended.
     """
 
@@ -173,6 +177,11 @@ class Trace:
     def blocks(self) -> tuple[Block, ...]:
         """The blocks, in order."""
         return tuple(self._blocks.values())
+
+    @property
+    def joints(self) -> int:
+        """Number of the arm's joints."""
+        return len(self.columns_of("q"))
 
     @property
     def data(self) -> Array:

@@ -68,7 +68,8 @@ class Resolver(PartConfig):
     type: Literal["bad_resolver"] = "bad_resolver"
     def build(self, arm): return self
     def start(self, problem): return None
-    def step(self, problem, memory): return Resolution(qdot=np.full(7, 100.0), residual=0.0), None
+    def step(self, problem, memory):
+        return Resolution(qdot=np.full_like(problem.q, 100.0), residual=0.0), None
 
 class Law(PartConfig):
     """Another torque each time."""
@@ -78,7 +79,7 @@ class Law(PartConfig):
 class Chance:
     terms = ("chance",)
     def start(self, problem): return None
-    def torque(self, problem, memory): return np.full((1, 7), random.random()), None
+    def torque(self, problem, memory): return np.full((1, problem.q.size), random.random()), None
 
 class Estimator(PartConfig):
     """Sees the trocar beside where it is."""
@@ -199,7 +200,7 @@ def test_good_parts_of_every_kind_keep_every_promise(surgsim, tmp_path):
         "policy",
     }
     assert all(row["passed"] and row["detail"] == "" for row in rows)
-    assert len([row for row in rows if row["part"] == "my_resolver"]) == 9
+    assert len([row for row in rows if row["part"] == "my_resolver"]) == 10
 
 
 BROKEN = {
@@ -207,10 +208,16 @@ BROKEN = {
     "bad_law": ("a finite row for every term", "the same problem gives other torques again"),
     "bad_estimator": ("starts where the trocar is seen", "the first estimate is 0.01 m from where"),
     "bad_task": ("commands are finite", "a command is not finite"),
-    "bad_disturbance": ("leaves the arm as the controller knows it", "the scene has 8 motors, not 7"),
-    "bad_prop": ("is deterministic under a seed", "RuntimeError: no wood left"),
+    "bad_disturbance": (
+        "leaves the arm as the controller knows it",
+        "6 joints: the scene has 7 motors, not 6",
+    ),
+    "bad_prop": ("is deterministic under a seed", "6 joints: RuntimeError: no wood left"),
     "bad_plant": ("every key has a default", "must"),
-    "bad_policy": ("actions are finite, of one shape", "an action has the shape (2,), not (3,) or (7,)"),
+    "bad_policy": (
+        "actions are finite, of one shape",
+        "6 joints: an action has the shape (2,), not (3,) or (6,)",
+    ),
 }
 
 
@@ -224,6 +231,42 @@ def test_bad_parts_of_every_kind_are_told_what_they_break(surgsim, tmp_path):
         said = [text for (name, check), text in broken.items() if name == part and check.startswith(promise)]
         assert said, f"{part} keeps '{promise}'"
         assert reason in said[0]
+
+
+FOR_SEVEN = '''
+"""Parts that were written for an arm of seven joints."""
+from typing import ClassVar, Literal
+import numpy as np
+from surgsim.catalog import PartConfig
+from surgsim.control.problem import Resolution
+from surgsim.control.resolvers.pinv import PinvConfig
+
+class Resolver(PartConfig):
+    """Damps what is there, of seven joints."""
+    type: Literal["seven"] = "seven"
+    def build(self, arm): return self
+    def start(self, problem): return None
+    def step(self, problem, memory): return Resolution(qdot=np.full(7, 1e-3), residual=0.0), None
+
+class Wasteful(PinvConfig):
+    """Needs more than any arm has."""
+    type: Literal["wasteful"] = "wasteful"
+    needs_redundancy: ClassVar[int] = 4
+'''
+
+
+def test_a_part_for_seven_joints_alone_is_told_so(surgsim, tmp_path):
+    points = "[surgsim.resolvers]\nseven = seven_lab:Resolver\nwasteful = seven_lab:Wasteful\n"
+    install(tmp_path / "site", "seven-lab", points, seven_lab=FOR_SEVEN)
+    done = surgsim("test-part", "seven-lab", "--json")
+    assert (done.returncode, done.stderr) == (1, "")
+    broken = {
+        (row["part"], row["check"]): row["detail"] for row in json.loads(done.stdout) if not row["passed"]
+    }
+    finite = "answers are finite, inside the bounds, with their residual"
+    assert broken["seven", finite] == "6 joints: qdot has the shape (7,), not (6,)"
+    redundancy = {part: text for (part, check), text in broken.items() if check.startswith("says how much")}
+    assert redundancy == {"wasteful": "needs_redundancy is 4; an arm of eight joints has 3 with a trocar"}
 
 
 POINTS = """
@@ -321,5 +364,5 @@ def test_a_package_installed_from_its_wheel(surgsim, tmp_path):
     subprocess.run([*pip, "install", *alone, "--target", site, wheel], check=True, timeout=200)
     done = surgsim("test-part", "wheel-lab")
     assert done.returncode == 0, done.stdout + done.stderr
-    assert done.stdout.startswith("wheel-lab: 1 part, 9 checks, none broken\n")
+    assert done.stdout.startswith("wheel-lab: 1 part, 10 checks, none broken\n")
     assert "resolver my_resolver" in done.stdout

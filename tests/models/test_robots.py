@@ -4,34 +4,47 @@ import mujoco
 import numpy as np
 import pytest
 
+from surgsim.control.rcm import rcm_kinematics
 from surgsim.control.self_motion import elbow_swivel_rad
 from surgsim.models.arm import ArmModel
 from surgsim.models.build import Scene, build, build_arm
-from surgsim.models.config import RobotConfig, RobotName, SceneConfig, TrocarConfig
-from surgsim.models.robot import JOINTS, MOTORS, robot_names, robot_spec
+from surgsim.models.config import RobotConfig, SceneConfig, TrocarConfig
+from surgsim.models.robot import (
+    arms_for_tests,
+    joint_names,
+    link_names,
+    motor_names,
+    robot_joints,
+    robot_names,
+    robot_spec,
+)
 from surgsim.scenario.load import load_scenario, shipped
 
-BODIES = ("base", *(f"link{i}" for i in range(1, 8)))
 every_robot = pytest.mark.parametrize("name", robot_names())
+every_arm = pytest.mark.parametrize("name", [*robot_names(), *arms_for_tests()])
 
 
 def _arm(name: str) -> Scene:
     return build_arm(SceneConfig(robot=RobotConfig(name=name), instrument=None))
 
 
-def test_the_schema_knows_every_shipped_robot():
-    assert sorted(RobotName.__args__) == robot_names() == ["lwr4plus", "panda"]
+def test_the_arms_and_their_joints():
+    assert {name: robot_joints(name) for name in robot_names()} == {"lwr4plus": 7, "panda": 7}
+    tested = {name: robot_joints(name) for name in arms_for_tests()}
+    assert tested == {"test_arm_6": 6, "test_arm_7": 7, "test_arm_8": 8}
 
 
-@every_robot
+@every_arm
 def test_names_follow_the_rules(name):
-    spec = robot_spec(name)
+    spec, n = robot_spec(name), robot_joints(name)
+    joints = [f"joint{i}" for i in range(1, n + 1)]
     assert spec.modelname == name
-    assert [body.name for body in spec.bodies[1:]] == list(BODIES)
-    assert [joint.name for joint in spec.joints] == list(JOINTS)
-    assert [(motor.name, motor.target) for motor in spec.actuators] == list(zip(MOTORS, JOINTS, strict=True))
+    assert [body.name for body in spec.bodies[1:]] == ["base", *(f"link{i}" for i in range(1, n + 1))]
+    assert [joint.name for joint in spec.joints] == list(joint_names(spec)) == joints
+    motors = [(motor.name, motor.target) for motor in spec.actuators]
+    assert motors == list(zip(motor_names(n), joints, strict=True))
     assert [site.name for site in spec.sites] == ["flange"]
-    assert spec.site("flange").parent.name == "link7"
+    assert spec.site("flange").parent.name == link_names(n)[-1] == f"link{n}"
     assert not spec.keys  # a home in mid range needs none, and grafting would rename it
 
 
@@ -48,7 +61,23 @@ def test_the_last_joint_turns_about_the_tool_axis(name):
     assert offset @ z > 0.05
 
 
-@every_robot
+def test_what_is_left_when_tip_and_shaft_are_held():
+    """The null space of [J_T; J_rcm] without the roll about the shaft, where the last joint is one."""
+    rolls = {name: 1 for name in (*robot_names(), *arms_for_tests())} | {"test_arm_8": 0}
+    for name, roll in rolls.items():
+        arm = ArmModel(SceneConfig(robot=RobotConfig(name=name)))
+        q = 0.3 * arm.limits.q_min + 0.7 * arm.limits.q_max
+        kin = arm.kinematics(q)
+        rcm = rcm_kinematics(kin, kin.p_WT - 0.2 * kin.R_WT[:, 2], np.zeros(3))
+        rows = {False: kin.Jv_WT, True: np.vstack([kin.Jv_WT, rcm.jacobian])}
+        for trocar, J in rows.items():
+            assert arm.redundancy(trocar) == q.size - np.linalg.matrix_rank(J, tol=1e-6) - roll
+        turned = arm.kinematics(q + 0.1 * np.eye(q.size)[-1])
+        moved = np.abs(turned.p_WT - kin.p_WT).max() + np.abs(turned.R_WT[:, 2] - kin.R_WT[:, 2]).max()
+        assert (moved < 1e-12) == arm.rolls_shaft == bool(roll)
+
+
+@every_arm
 def test_limits_are_whole_and_the_motors_are_torques(name):
     arm = _arm(name)
     limits, model = arm.limits, arm.model
@@ -57,7 +86,7 @@ def test_limits_are_whole_and_the_motors_are_torques(name):
         assert np.isfinite(limit).all()
         assert (limit > 0).all()
     for limit in (limits.jerk, limits.torque_rate):
-        assert limit.shape == (7,)
+        assert limit.shape == (robot_joints(name),)
         assert (limit > 0).all()
     np.testing.assert_array_equal(model.actuator_ctrlrange[:, 0], -limits.torque)
     np.testing.assert_array_equal(model.actuator_gear[:, 0], 1)
@@ -67,25 +96,25 @@ def test_limits_are_whole_and_the_motors_are_torques(name):
     assert model.actuator_ctrllimited.all()
 
 
-@every_robot
-@pytest.mark.parametrize("body", BODIES)
-def test_every_link_is_physically_consistent(name, body):
+@every_arm
+def test_every_link_is_physically_consistent(name):
     model = _arm(name).model
-    index = model.body(body).id
-    moments = model.body_inertia[index]
-    # The pseudo-inertia is positive definite exactly when the mass is positive and so is each half sum
-    # of two principal moments less the third.
-    assert model.body_mass[index] > 0
-    assert (moments.sum() / 2 - moments > 0).all()
+    for body in ("base", *link_names(robot_joints(name))):
+        index = model.body(body).id
+        moments = model.body_inertia[index]
+        # The pseudo-inertia is positive definite exactly when the mass is positive and so is each half sum
+        # of two principal moments less the third.
+        assert model.body_mass[index] > 0, body
+        assert (moments.sum() / 2 - moments > 0).all(), body
 
 
-@every_robot
+@every_arm
 def test_the_motors_can_hold_arm_and_instrument_anywhere(name):
     arm = ArmModel(SceneConfig(robot=RobotConfig(name=name)))
     rng = np.random.default_rng(0)
     for _ in range(200):
         q = rng.uniform(arm.limits.q_min, arm.limits.q_max)
-        assert (np.abs(arm.dynamics(q, np.zeros(7)).bias) < arm.limits.torque).all()
+        assert (np.abs(arm.dynamics(q, np.zeros_like(q)).bias) < arm.limits.torque).all()
 
 
 @every_robot

@@ -18,32 +18,37 @@ from surgsim.simulate.setup import prepare
 ANSWERS = """
 import sys
 import numpy as np
-from surgsim.contract import problems
+from surgsim.contract.arms import arm_of, cases, scenes
+from surgsim.contract.problems import torque_problem, velocity_problem
 from surgsim.control.failure import ControlFailure
 from surgsim.control.port_estimators import PORT_ESTIMATORS
 from surgsim.control.resolvers import RESOLVERS
 from surgsim.control.torque_laws import TORQUE_LAWS
+from surgsim.models.config import RobotConfig, SceneConfig
 
-arm = problems.arm()
 fewer = {"self_motion": {"search_starts": 1}}  # a search in Python takes its time
-for catalog, make, call in (
-    (RESOLVERS, problems.velocity_problem, "step"),
-    (TORQUE_LAWS, problems.torque_problem, "torque"),
-):
-    for name in catalog.names():
-        part = catalog.config(name)(**fewer.get(name, {})).build(arm)
-        if not hasattr(part, "kernel"):
+kinds = ((RESOLVERS, velocity_problem, "step"), (TORQUE_LAWS, torque_problem, "torque"))
+parts = [
+    (catalog.config(name)(**fewer.get(name, {})), make, call)
+    for catalog, make, call in kinds
+    for name in catalog.names()
+]
+usual = SceneConfig(robot=RobotConfig(name="lwr4plus"))
+for arm in map(arm_of, (usual, *scenes())):
+    for config, make, call in parts:
+        part = config.build(arm)
+        if not hasattr(part, "kernel") or True not in cases(config, arm):
             continue
         memory = None
         for seed in range(4):
             try:
-                found, memory = getattr(part, call)(make(seed), memory)
+                found, memory = getattr(part, call)(make(arm, seed), memory)
             except ControlFailure as failure:
-                print(name, seed, failure.detail)
+                print(config.type, seed, failure.detail)
                 memory = None
                 continue
             values = found if call == "torque" else found.qdot
-            print(name, seed, values.tobytes().hex(), memory.tobytes().hex())
+            print(config.type, values.size, seed, values.tobytes().hex(), memory.tobytes().hex())
 """
 
 

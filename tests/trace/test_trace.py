@@ -8,7 +8,8 @@ import pytest
 
 from surgsim.columns import joints, scalar, vector
 from surgsim.errors import Outcome
-from surgsim.trace.trace import BASE_BLOCKS, Ending, Trace, TraceMeta
+from surgsim.plant.props.peg_board import PegBoardConfig
+from surgsim.trace.trace import Ending, Trace, TraceMeta, base_blocks
 
 AXES = ("x", "y", "z")
 CONTRACT = (
@@ -32,7 +33,7 @@ META = TraceMeta(
 
 
 def test_the_base_blocks_give_the_columns_that_outside_tools_rely_on():
-    columns = [column for block in BASE_BLOCKS for column in block.columns]
+    columns = [column for block in base_blocks(7) for column in block.columns]
     assert set(CONTRACT) <= set(columns)
     assert len(set(columns)) == len(columns)
     assert columns[0] == "t_s"
@@ -41,7 +42,7 @@ def test_the_base_blocks_give_the_columns_that_outside_tools_rely_on():
 @pytest.mark.parametrize(
     ("block", "first", "last"),
     [
-        (joints("tau_tip_", "nm"), "tau_tip_1_nm", "tau_tip_7_nm"),
+        (joints("tau_tip_", "nm", 7), "tau_tip_1_nm", "tau_tip_7_nm"),
         (vector("tip", "m"), "tip_x_m", "tip_z_m"),
         (vector("force", "n"), "force_x_n", "force_z_n"),
         (scalar("manipulability"), "manipulability", "manipulability"),
@@ -53,7 +54,7 @@ def test_block_columns(block, first, last):
 
 
 def _small(data):
-    return Trace(data, (scalar("t", "s"), vector("tip", "m"), joints("q", "rad")), META)
+    return Trace(data, (scalar("t", "s"), vector("tip", "m"), joints("q", "rad", 7)), META)
 
 
 def test_columns_and_blocks_are_found_by_name():
@@ -131,3 +132,12 @@ ENDING = {"outcome": "completed", "t_s": 1.0, "detail": ""}
 def test_damaged_meta_data_is_a_value_error(text):
     with pytest.raises(ValueError):  # noqa: PT011 - JSON's own is a ValueError too
         TraceMeta.from_json(text)
+
+
+@pytest.mark.parametrize("rings", [1, 6, 7, 8])
+def test_what_is_numbered_and_no_joint_has_the_same_columns_however_many_there_are(rings):
+    pegs = [(0.03 * i - 0.1, y) for y in (-0.05, 0.05) for i in range(rings)]
+    config = PegBoardConfig(source_m=tuple(pegs[:rings]), target_m=tuple(pegs[rings:]))
+    first = config.build(np.random.default_rng(0)).columns[0]
+    assert first.columns == tuple(f"ring_state_{i}" for i in range(1, rings + 1))
+    assert joints("q", "rad", rings).columns == tuple(f"q{i}_rad" for i in range(1, rings + 1))

@@ -23,11 +23,11 @@ class Seen(Protocol):
 
     @property
     def q(self) -> Array:
-        """Joint positions (7,) [rad]."""
+        """Joint positions (n,) [rad]."""
 
     @property
     def v(self) -> Array:
-        """Joint velocities (7,) [rad/s]."""
+        """Joint velocities (n,) [rad/s]."""
 
     @property
     def kin(self) -> Kinematics:
@@ -56,8 +56,8 @@ def observe(seen: Seen) -> dict[str, Array]:
     | name | shape | meaning |
     |---|---|---|
     | `time` | (1,) | time since the start [s] |
-    | `joint_position` | (7,) | q [rad] |
-    | `joint_velocity` | (7,) | q' [rad/s] |
+    | `joint_position` | (n,) | q [rad] |
+    | `joint_velocity` | (n,) | q' [rad/s] |
     | `tip_position` | (3,) | p_WT [m] |
     | `tip_error` | (3,) | p_WT - p_WTd, to the command now [m] |
     | `command_velocity` | (3,) | v_WTd [m/s] |

@@ -12,5 +12,5 @@ def proportional(observation: Observation) -> Array:
 
 
 def damping(observation: Observation) -> Array:
-    """Torque tau = -5 q' (7,) [N m]: the arm comes to rest where it is."""
+    """Torque tau = -5 q' (n,) [N m]: the arm comes to rest where it is."""
     return -DAMPING_NM_S_PER_RAD * observation["joint_velocity"]

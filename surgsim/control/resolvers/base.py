@@ -24,7 +24,8 @@ ResolverKernel = Callable[[Array, Seen, Array, Resolved], int]
 class Resolver(Protocol[Memory]):
     """Resolves redundancy at velocity level. Its state is explicit, so a step is a pure function.
 
-    A resolver may have `columns`, blocks that its `Resolution.values` add to the trace.
+    A resolver may have `columns`, blocks that its `Resolution.values` add to the trace. Its config may say
+    how many degrees of freedom it needs, see `surgsim.control.redundancy`.
     """
 
     def start(self, problem: VelocityProblem) -> Memory:

@@ -3,7 +3,6 @@
 from typing import Literal
 
 import mink
-import mujoco
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import NonNegativeFloat, PositiveFloat
@@ -14,6 +13,7 @@ from surgsim.control.mink_tasks import RcmTask
 from surgsim.control.problem import Resolution, VelocityProblem, bounded_resolution, stacked_rows
 from surgsim.errors import Outcome
 from surgsim.models.arm import ArmModel
+from surgsim.models.robot import joint_names
 
 Array = NDArray[np.float64]
 
@@ -54,8 +54,7 @@ class Mink:
         self._configuration = mink.Configuration(model)
         self._tip = mink.FrameTask("tip", "site", position_cost=config.tip_cost, orientation_cost=0.0)
         self._rcm = RcmTask(arm.scene.tip_site, model.nv)
-        names = [mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_JOINT, i) for i in range(7)]
-        speeds = dict(zip(names, arm.limits.velocity.tolist(), strict=True))
+        speeds = dict(zip(joint_names(model), arm.limits.velocity.tolist(), strict=True))
         self._model = model
         self._velocity_limit = mink.VelocityLimit(model, speeds)
         self._limits: tuple[mink.Limit, ...] = ()

@@ -12,6 +12,7 @@ from surgsim.columns import Block
 from surgsim.control.policies.asking import Asker, Held
 from surgsim.control.policies.registry import find_policy
 from surgsim.control.problem import Resolution, VelocityProblem, bounded_resolution, stacked_rows
+from surgsim.control.redundancy import redundancy_needed
 from surgsim.control.resolvers import RESOLVERS
 from surgsim.control.resolvers.pinv import PinvConfig
 from surgsim.models.arm import ArmModel
@@ -27,7 +28,7 @@ class PolicyConfig(PartConfig):
 
     Attributes:
         name: The policy: shipped, registered, or an entry point of the group `surgsim.policies`.
-        action: What its action is: a `tip_velocity` (3) [m/s] or a `joint_velocity` (7) [rad/s].
+        action: What its action is: a `tip_velocity` (3) [m/s] or a `joint_velocity` (n) [rad/s].
         resolver: Resolves a tip velocity and holds the RCM; not used for joint velocities.
         tip_speed_max_m_per_s: Bound of each component of a tip velocity.
         decimation: The policy is asked once in that many control ticks; its action holds in between.
@@ -39,6 +40,11 @@ class PolicyConfig(PartConfig):
     resolver: AnyOtherResolver = PinvConfig()
     tip_speed_max_m_per_s: PositiveFloat = 0.1
     decimation: Annotated[int, Field(ge=1, le=100_000)] = 1
+
+    @property
+    def needs_redundancy(self) -> int:
+        """As much as the resolver of a tip velocity."""
+        return redundancy_needed(self.resolver) if self.action == "tip_velocity" else 0
 
     def build(self, arm: ArmModel) -> "PolicyResolver":
         """The resolver.

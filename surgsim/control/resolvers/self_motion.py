@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -54,6 +54,7 @@ class SelfMotionConfig(PartConfig):
             start configuration alone.
     """
 
+    needs_redundancy: ClassVar[int] = 1
     type: Literal["self_motion"] = "self_motion"
     k_tip: NonNegativeFloat = 5.0
     k_rcm: NonNegativeFloat = 5.0
@@ -67,7 +68,7 @@ class SelfMotionConfig(PartConfig):
         return KernelResolver(
             kernel=self_motion,
             arm=arm,
-            gains=np.concatenate((numbers, search_offsets(self.search_starts, n).ravel())),
+            gains=np.concatenate((numbers, search_offsets(self.search_starts, arm).ravel())),
             memory_size=3 * n + _TASK_ROWS,
             failures={INFEASIBLE: "self-motion: no joint velocity inside Omega meets the task rows"},
             examine=_examine,

@@ -1,6 +1,6 @@
 """Interface of a torque-level law: a Python object, or a kernel of the compiled loop."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Protocol, TypeVar
 
@@ -11,6 +11,7 @@ from surgsim.control.failure import ControlFailure, failure_of
 from surgsim.control.problem import Resolution
 from surgsim.control.rcm import Rcm
 from surgsim.control.seen import dynamics_of, fill_kinematics, fill_rcm_of, kinematics_of, new_seen, rcm_of
+from surgsim.errors import SurgsimError
 from surgsim.models.arm import ArmModel, Dynamics, Kinematics
 from surgsim.plant.state import NO_FORCE
 from surgsim.tasks.base import TipCommand
@@ -126,6 +127,28 @@ class KernelTorqueLaw:
         """Why there is no answer."""
         data = {"q": seen.q.copy(), "v": seen.v.copy(), "M": seen.M.copy()}
         return failure_of(status, self.failures, data)
+
+
+def for_joints(key: str, given: Sequence[float] | None, profile: Sequence[float], n: int) -> Array:
+    """A gain for each of n joints (n,): as `given`, or where that is None from a profile along an arm.
+
+    The profile runs from base to flange and is linear between its places; n joints are spread evenly over it.
+    An arm of as many joints as the profile has places has the profile itself.
+
+    Args:
+        key: Of the gains, for the message.
+        given: The gains (n,), or None.
+        profile: Those of another number of joints.
+        n: Number of joints.
+
+    Raises:
+        SurgsimError: If other than n are given.
+    """
+    if given is None:
+        return np.interp(np.linspace(0.0, 1.0, n), np.linspace(0.0, 1.0, len(profile)), profile)
+    if len(given) != n:
+        raise SurgsimError(f"{key} has {len(given)} items for an arm of {n} joints: give {n}, or null")
+    return np.array(given, dtype=np.float64)
 
 
 def seen_of_torque(p: TorqueProblem, arm: ArmModel) -> Any:

@@ -8,9 +8,9 @@ from pydantic import NonNegativeFloat
 
 from surgsim.catalog import PartConfig
 from surgsim.compiled import compiled
-from surgsim.control.torque_laws.base import KernelTorqueLaw
+from surgsim.control.torque_laws.base import KernelTorqueLaw, for_joints
 from surgsim.models.arm import ArmModel
-from surgsim.models.config import Vec3, Vec7
+from surgsim.models.config import PerJoint, Vec3
 from surgsim.tick.algebra import (
     back_substitute,
     back_substitute_rows,
@@ -25,6 +25,10 @@ from surgsim.tick.scratch import scratch, scratch_matrix
 from surgsim.tick.status import GOES_ON, RANK_LOST
 
 Array = NDArray[np.float64]
+TABLE_I_STIFFNESS = (80.0, 120.0, 60.0, 30.0, 20.0, 10.0, 10.0)
+"""K_N2 of Table I of the VPRNN paper, from base to flange [N m/rad]."""
+TABLE_I_DAMPING = (6.0, 10.0, 5.0, 3.0, 2.0, 1.0, 1.0)
+"""K_D2 of the same table [N m s/rad]."""
 
 
 class HierarchicalImpedanceConfig(PartConfig):
@@ -35,8 +39,9 @@ class HierarchicalImpedanceConfig(PartConfig):
         tip_damping_n_s_per_m: D_X, diagonal.
         rcm_stiffness_n_per_m: K_N.
         rcm_damping_n_s_per_m: D_N.
-        joint_stiffness_nm_per_rad: K_N2, diagonal.
-        joint_damping_nm_s_per_rad: D_N2 (K_D2 in Table I), diagonal.
+        joint_stiffness_nm_per_rad: K_N2, diagonal; null: Table I's from base to flange, read off at the arm's
+            joints.
+        joint_damping_nm_s_per_rad: D_N2 (K_D2 in Table I), diagonal; null: likewise.
     """
 
     type: Literal["hierarchical_impedance"] = "hierarchical_impedance"
@@ -44,18 +49,23 @@ class HierarchicalImpedanceConfig(PartConfig):
     tip_damping_n_s_per_m: Vec3 = (30.0, 30.0, 30.0)
     rcm_stiffness_n_per_m: NonNegativeFloat = 800.0
     rcm_damping_n_s_per_m: NonNegativeFloat = 10.0
-    joint_stiffness_nm_per_rad: Vec7 = (80.0, 120.0, 60.0, 30.0, 20.0, 10.0, 10.0)
-    joint_damping_nm_s_per_rad: Vec7 = (6.0, 10.0, 5.0, 3.0, 2.0, 1.0, 1.0)
+    joint_stiffness_nm_per_rad: PerJoint | None = None
+    joint_damping_nm_s_per_rad: PerJoint | None = None
 
     def build(self, arm: ArmModel) -> KernelTorqueLaw:
-        """The law; gains K_X (3,), D_X (3,), K_N, D_N, K_N2 (n,), D_N2 (n,)."""
+        """The law; gains K_X (3,), D_X (3,), K_N, D_N, K_N2 (n,), D_N2 (n,).
+
+        Raises:
+            SurgsimError: If a list has not a number for each joint.
+        """
+        n = arm.limits.q_min.size
         gains = [
             *self.tip_stiffness_n_per_m,
             *self.tip_damping_n_s_per_m,
             self.rcm_stiffness_n_per_m,
             self.rcm_damping_n_s_per_m,
-            *self.joint_stiffness_nm_per_rad,
-            *self.joint_damping_nm_s_per_rad,
+            *for_joints("joint_stiffness_nm_per_rad", self.joint_stiffness_nm_per_rad, TABLE_I_STIFFNESS, n),
+            *for_joints("joint_damping_nm_s_per_rad", self.joint_damping_nm_s_per_rad, TABLE_I_DAMPING, n),
         ]
         terms = ("tip", "rcm", "joint", "bias")
         return KernelTorqueLaw(kernel=hierarchical_impedance, arm=arm, terms=terms, gains=np.array(gains))

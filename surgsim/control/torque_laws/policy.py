@@ -57,7 +57,7 @@ class PolicyLaw:
         return None
 
     def torque(self, problem: TorqueProblem, memory: Held | None) -> tuple[Array, Held]:
-        """Rows policy, bias (2, 7) [N m]."""
+        """Rows policy, bias (2, n) [N m]."""
         held = self._asker.ask(problem, memory)
-        bias = problem.dyn.bias if self._add_bias else np.zeros(7)
+        bias = problem.dyn.bias if self._add_bias else np.zeros_like(held.action)
         return np.stack((held.action, bias)), held

@@ -1,5 +1,6 @@
 """What every disturbance has: its config's base and the spread over seeds."""
 
+import copy
 from typing import Annotated, Literal
 
 import numpy as np
@@ -28,6 +29,15 @@ DELAYED, QUANTISED, BIASED = 1, 2, 3
 def spread_factor(rng: np.random.Generator, spread: float, size: int = 1) -> Array:
     """`size` factors drawn uniformly from 1 - spread to 1 + spread."""
     return 1.0 + spread * rng.uniform(-1.0, 1.0, size)
+
+
+def copied(rng: np.random.Generator) -> np.random.Generator:
+    """A generator that draws what `rng` would, which stays as it is.
+
+    For values of each joint: how many there are is known once the model is there, and more than one may be
+    built with a part.
+    """
+    return copy.deepcopy(rng)
 
 
 def pointed(rng: np.random.Generator, vector: Array, direction: Direction) -> Array:

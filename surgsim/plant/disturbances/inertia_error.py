@@ -4,12 +4,10 @@ from typing import Annotated, Literal
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
-from surgsim.plant.disturbances.base import Disturbance, DisturbanceConfig, Spread, spread_factor
-
-_LINKS = tuple(f"link{i}" for i in range(1, 8))
+from surgsim.models.robot import joint_names, link_names
+from surgsim.plant.disturbances.base import Disturbance, DisturbanceConfig, Spread, copied, spread_factor
 
 
 class InertiaErrorConfig(DisturbanceConfig):
@@ -27,18 +25,21 @@ class InertiaErrorConfig(DisturbanceConfig):
 
     def build(self, rng: np.random.Generator) -> "InertiaError":
         """The disturbance, each link's error drawn."""
-        return InertiaError(1.0 + (self.factor - 1.0) * spread_factor(rng, self.spread, len(_LINKS)))
+        return InertiaError(self, rng)
 
 
 class InertiaError(Disturbance):
-    """Mass and inertia of links 1 to 7 times a factor each (7,); centres of mass and armature stay."""
+    """Mass and inertia of the n links times a factor each; centres of mass and armature stay."""
 
-    def __init__(self, factors: NDArray[np.float64]) -> None:
-        self._factors = factors
+    def __init__(self, config: InertiaErrorConfig, rng: np.random.Generator) -> None:
+        self._c = config
+        self._rng = rng
 
     def modify(self, spec: mujoco.MjSpec) -> None:
         """Scale the links."""
-        for name, factor in zip(_LINKS, self._factors, strict=True):
+        links = link_names(len(joint_names(spec)))
+        errors = (self._c.factor - 1.0) * spread_factor(copied(self._rng), self._c.spread, len(links))
+        for name, factor in zip(links, 1.0 + errors, strict=True):
             body = spec.body(name)
             body.mass = factor * body.mass
             body.inertia = factor * np.array(body.inertia)

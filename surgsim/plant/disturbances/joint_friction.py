@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 from pydantic import Field, NonNegativeFloat, model_validator
 
 from surgsim.models.build import Scene
-from surgsim.models.robot import JOINTS
-from surgsim.plant.disturbances.base import Disturbance, DisturbanceConfig, Spread, spread_factor
+from surgsim.models.robot import joint_names
+from surgsim.plant.disturbances.base import Disturbance, DisturbanceConfig, Spread, copied, spread_factor
 from surgsim.plant.truth import arm_view
 
 Array = NDArray[np.float64]
@@ -45,14 +45,9 @@ class JointFrictionConfig(DisturbanceConfig):
         return self
 
     def build(self, rng: np.random.Generator) -> "JointFriction | StribeckFriction":
-        """The disturbance, each joint's friction drawn."""
-        factors = spread_factor(rng, self.spread, 7)
-        dry = JointFriction(self, factors)
-        if self.static_nm is None:
-            return dry
-        return StribeckFriction(
-            dry, factors * (self.static_nm - self.coulomb_nm), self.stribeck_velocity_rad_per_s
-        )
+        """The disturbance, which draws each joint's friction."""
+        dry = JointFriction(self, rng)
+        return dry if self.static_nm is None else StribeckFriction(self, dry)
 
 
 class JointFriction(Disturbance):
@@ -62,13 +57,18 @@ class JointFriction(Disturbance):
     the ones here let it stick (0.3 urad/s). Several add up.
     """
 
-    def __init__(self, config: JointFrictionConfig, factors: Array) -> None:
+    def __init__(self, config: JointFrictionConfig, rng: np.random.Generator) -> None:
         self._c = config
-        self._factors = factors
+        self._rng = rng
+
+    def factors(self, n: int) -> Array:
+        """What each joint's torques are over the given ones (n,)."""
+        return spread_factor(copied(self._rng), self._c.spread, n)
 
     def modify(self, spec: mujoco.MjSpec) -> None:
         """Add to the joints' friction loss and damping."""
-        for name, factor in zip(JOINTS, self._factors, strict=True):
+        joints = joint_names(spec)
+        for name, factor in zip(joints, self.factors(len(joints)), strict=True):
             joint = spec.joint(name)
             joint.frictionloss += factor * self._c.coulomb_nm
             joint.solimp_friction, joint.solref_friction = _STIFF_IMPEDANCE, _STIFF_REFERENCE
@@ -90,17 +90,16 @@ class StribeckFriction(Disturbance):
     Automatica 30:1083 (1994).
 
     Args:
+        config: Torques and velocity.
         dry: Coulomb and viscous friction.
-        surplus: F_s - F_c (7,) [N m].
-        velocity: v_s [rad/s].
     """
 
-    def __init__(self, dry: JointFriction, surplus: Array, velocity: float) -> None:
+    def __init__(self, config: JointFrictionConfig, dry: JointFriction) -> None:
         self._dry = dry
-        self._surplus = surplus
-        self._velocity = velocity
+        self._over = (config.static_nm or config.coulomb_nm) - config.coulomb_nm
+        self._velocity = config.stribeck_velocity_rad_per_s
+        self._surplus, self._qvel = np.zeros(0), np.zeros(0)
         self._rows = slice(0, 0)
-        self._qvel = np.zeros(7)
 
     def modify(self, spec: mujoco.MjSpec) -> None:
         """Add Coulomb and viscous friction."""
@@ -108,11 +107,13 @@ class StribeckFriction(Disturbance):
 
     def start(self, scene: Scene, data: mujoco.MjData, rng: np.random.Generator, dt_s: float) -> None:
         """Find the arm's rows among the friction constraints, which follow the equality constraints."""
+        n = scene.dof_ids.size
+        self._surplus = self._dry.factors(n) * self._over
         with_friction = np.flatnonzero(scene.model.dof_frictionloss > 0.0)
         first = int(np.searchsorted(with_friction, scene.dof_ids[0]))
-        if not np.array_equal(with_friction[first : first + 7], scene.dof_ids):
+        if not np.array_equal(with_friction[first : first + n], scene.dof_ids):
             raise ValueError("the arm's joints have no friction constraint each")
-        self._rows = slice(first, first + 7)
+        self._rows = slice(first, first + n)
         self._qvel = arm_view(data.qvel, scene.dof_ids)
 
     def push(self, t_s: float, scene: Scene, data: mujoco.MjData) -> None:

@@ -11,6 +11,7 @@ from pydantic import Field, NonNegativeFloat, PositiveFloat
 from surgsim.compiled import compiled
 from surgsim.models.build import Scene
 from surgsim.models.config import Vec3
+from surgsim.models.robot import link_names
 from surgsim.plant.disturbances.base import Direction, Disturbance, DisturbanceConfig, pointed
 from surgsim.tick.arrays import World
 from surgsim.tick.scratch import scratch
@@ -54,7 +55,8 @@ class PushConfig(DisturbanceConfig):
 
     Attributes:
         force_n: Force in the world frame [N].
-        at: Where it acts: `tip`, `shaft` (a point of the shaft's axis), `elbow` (link 4) or `wrist` (link 6).
+        at: Where it acts: `tip`, `shaft` (a point of the shaft's axis), `elbow` (the link in the middle, the
+            fourth of seven) or `wrist` (the last link but one).
         distance_m: Of that point of the shaft from the tip [m]; without effect elsewhere.
         start_s: When it begins [s].
         duration_s: How long it lasts [s].
@@ -94,11 +96,9 @@ class Push(Disturbance):
     def attach(self, scene: Scene, dt_s: float) -> None:
         """Find the body that is pushed."""
         gains, tip, at = self.gains, scene.tip_site, self._c.at
-        if at in _LINKS:
-            gains[BODY] = int(scene.model.body(_LINKS[at]).id)
+        if at in ("elbow", "wrist"):
+            links = link_names(scene.dof_ids.size)
+            gains[BODY] = int(scene.model.body(links[(len(links) - 1) // 2 if at == "elbow" else -2]).id)
             return
         gains[BODY], gains[SITE] = int(scene.model.site_bodyid[tip]), tip
         gains[DISTANCE] = self._c.distance_m if at == "shaft" else 0.0
-
-
-_LINKS = {"elbow": "link4", "wrist": "link6"}

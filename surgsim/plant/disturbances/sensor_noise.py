@@ -77,9 +77,9 @@ def _track(gains: Array, world: World, memory: Array) -> None:
 class SensorNoiseConfig(DisturbanceConfig):
     """White noise of all sensors, encoder steps, and a tracker of the port that measures now and then.
 
-    Assumed where no source is named. The LWR's absolute joint sensor resolves 0.01 deg, 1.7e-4 rad (DLR); the
-    default is a twentieth of it, as joint positions are taken from the motor's sensor before the gear. An
-    optical tracker of the port has a static error of 0.045 mm RMS in space (Polaris Vega,
+    Assumed where no source is named. A light-weight arm's absolute joint sensor resolves 0.01 deg, 1.7e-4 rad
+    (DLR); the default is a twentieth of it, as joint positions are taken from the motor's sensor before the
+    gear. An optical tracker of the port has a static error of 0.045 mm RMS in space (Polaris Vega,
     doi 10.1186/s13014-021-01804-7), so a port_std_m of 2.6e-5; the default is a port that is known,
     not tracked.
 

@@ -8,7 +8,15 @@ from numpy.typing import NDArray
 from pydantic import NonNegativeFloat
 
 from surgsim.compiled import compiled
-from surgsim.plant.disturbances.base import BIASED, Disturbance, DisturbanceConfig, Spread, spread_factor
+from surgsim.models.build import Scene
+from surgsim.plant.disturbances.base import (
+    BIASED,
+    Disturbance,
+    DisturbanceConfig,
+    Spread,
+    copied,
+    spread_factor,
+)
 from surgsim.tick.arrays import World
 from surgsim.tick.status import GOES_ON
 
@@ -50,20 +58,26 @@ class TorqueBiasConfig(DisturbanceConfig):
     spread: Spread = 0.0
 
     def build(self, rng: np.random.Generator) -> "TorqueBias":
-        """The disturbance, each joint's bias drawn."""
-        bias = self.bias_nm * spread_factor(rng, self.spread, 7)
-        if self.signs == "random":
-            bias *= rng.choice([-1.0, 1.0], 7)
-        return TorqueBias(bias, of=self.of)
+        """The disturbance, which draws each joint's bias."""
+        return TorqueBias(self, rng)
 
 
 class TorqueBias(Disturbance):
-    """Adds one bias (7,) [N m] to the torque that acts and another to the one measured."""
+    """Adds one bias (n,) [N m] to the torque that acts and another to the one measured."""
 
     rank = BIASED
     kernels: Mapping[str, Any] = {"actuate": bias_drive, "sense": bias_sensor}
 
-    def __init__(self, bias: Array, *, of: Literal["sensor", "drive", "loop"]) -> None:
-        acting = {"sensor": 0.0, "drive": 1.0, "loop": -1.0}[of] * bias
-        measured = {"sensor": 1.0, "drive": 0.0, "loop": 1.0}[of] * bias
+    def __init__(self, config: TorqueBiasConfig, rng: np.random.Generator) -> None:
+        self._c = config
+        self._rng = rng
+
+    def attach(self, scene: Scene, dt_s: float) -> None:
+        """Draw each joint's bias."""
+        c, rng, n = self._c, copied(self._rng), scene.dof_ids.size
+        bias = c.bias_nm * spread_factor(rng, c.spread, n)
+        if c.signs == "random":
+            bias *= rng.choice([-1.0, 1.0], n)
+        acting = {"sensor": 0.0, "drive": 1.0, "loop": -1.0}[c.of] * bias
+        measured = {"sensor": 1.0, "drive": 0.0, "loop": 1.0}[c.of] * bias
         self.gains = np.concatenate((acting, measured))

@@ -6,8 +6,8 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from usual_arm import usual_arm
 
-from surgsim.contract import problems
 from surgsim.control.failure import ControlFailure
 from surgsim.control.policies import registry
 from surgsim.control.policies.asking import Asker
@@ -144,7 +144,7 @@ def test_an_action_must_have_its_shape_and_be_finite(velocity_problem):
 def test_a_tip_velocity_is_resolved_from_a_moving_reference(arm, velocity_problem):
     """Two steps of the resolver are two steps of the inner one with the command made by hand."""
     resolver = PolicyConfig().build(arm)
-    inner = PinvConfig().build(problems.arm())
+    inner = PinvConfig().build(usual_arm())
     first = velocity_problem(2)
     v = proportional(observe(first))
     memory = resolver.start(first)

@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from usual_arm import usual_arm
 
-from surgsim.contract import problems
 from surgsim.control.failure import ControlFailure
 from surgsim.control.resolvers.mink import Mink, MinkConfig
 from surgsim.control.resolvers.pinv import PinvConfig
@@ -24,7 +24,7 @@ def _mink(arm, p, **config):
 @pytest.mark.parametrize("trocar", [True, False])
 def test_answer_is_that_of_the_pseudo_inverse(arm, velocity_problem, seed, trocar):
     p = velocity_problem(seed, trocar=trocar, speed=0.005)
-    pinv = PinvConfig(k_tip=3.0, k_rcm=7.0).build(problems.arm())
+    pinv = PinvConfig(k_tip=3.0, k_rcm=7.0).build(usual_arm())
     expected = pinv.step(p, None)[0].qdot
     assert (np.abs(expected) < p.upper).all()
     answer = _mink(arm, p, k_tip=3.0, k_rcm=7.0)

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.optimize import minimize
+from usual_arm import usual_arm
 
-from surgsim.contract import problems
 from surgsim.control.failure import ControlFailure
 from surgsim.control.planes import PlaneConfig
 from surgsim.control.problem import braking_bounds
@@ -23,7 +23,7 @@ def _problem(velocity_problem, seed, *, budget=None, speed=0.02, roll_rate=0.3):
 
 def _steps(config, p, count=400):
     """The answer after `count` periods at the same place, when no acceleration bound is active any more."""
-    resolver = config.build(problems.arm())
+    resolver = config.build(usual_arm())
     memory = resolver.start(p)
     for _ in range(count):
         answer, memory = resolver.step(p, memory)
@@ -147,7 +147,7 @@ def test_the_speed_limit_holds_along_each_axis(velocity_problem, seed):
 @seeds
 def test_accelerations_stay_inside_their_limits_from_tick_to_tick(velocity_problem, seed):
     p = _problem(velocity_problem, seed, speed=0.1)
-    resolver = PassiveQpConfig().build(problems.arm())
+    resolver = PassiveQpConfig().build(usual_arm())
     memory, last = resolver.start(p), p.v
     for _ in range(20):
         low, high = braking_bounds(p, last)
@@ -160,7 +160,7 @@ def test_accelerations_stay_inside_their_limits_from_tick_to_tick(velocity_probl
 
 def test_a_budget_that_ends_in_full_motion_relaxes_the_acceleration_and_says_so(velocity_problem):
     p = _problem(velocity_problem, 3, speed=0.1)
-    resolver = PassiveQpConfig().build(problems.arm())
+    resolver = PassiveQpConfig().build(usual_arm())
     memory = resolver.start(p)
     for _ in range(400):
         _, memory = resolver.step(p, memory)
@@ -174,7 +174,7 @@ def test_a_budget_that_ends_in_full_motion_relaxes_the_acceleration_and_says_so(
 def test_rows_that_exclude_each_other_are_infeasible_with_their_matrices(velocity_problem):
     p = _problem(velocity_problem, 4)
     far = PlaneConfig(normal=(0.0, 0.0, 1.0), offset_m=float(p.kin.p_WT[2]) - 1.0)  # 1 m inside: 20 m/s asked
-    resolver = PassiveQpConfig(planes=(far,)).build(problems.arm())
+    resolver = PassiveQpConfig(planes=(far,)).build(usual_arm())
     with pytest.raises(ControlFailure, match="1 planes, the energy budget") as failure:
         resolver.step(p, resolver.start(p))
     assert {"H", "G", "G_upper"} <= set(failure.value.data)
@@ -182,7 +182,7 @@ def test_rows_that_exclude_each_other_are_infeasible_with_their_matrices(velocit
 
 def test_the_resolved_motion_leads_the_measured_tip_by_no_more_than_allowed(velocity_problem):
     p = _problem(velocity_problem, 5, speed=0.1)
-    resolver = PassiveQpConfig(lead_max_m=0.002).build(problems.arm())
+    resolver = PassiveQpConfig(lead_max_m=0.002).build(usual_arm())
     memory = resolver.start(p)
     for _ in range(1000):  # the tip is held where it is
         answer, memory = resolver.step(p, memory)

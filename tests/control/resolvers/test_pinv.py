@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from usual_arm import usual_arm
 
-from surgsim.contract import problems
 from surgsim.control.resolvers.pinv import PinvConfig
 
 seeds = pytest.mark.parametrize("seed", range(4))
@@ -16,7 +16,7 @@ def _unbounded(problem):
 
 
 def _answer(problem, **config):
-    resolver = PinvConfig(**config).build(problems.arm())
+    resolver = PinvConfig(**config).build(usual_arm())
     return resolver.step(problem, resolver.start(problem))[0]
 
 

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 from scipy.optimize import lsq_linear
+from usual_arm import usual_arm
 
-from surgsim.contract import problems
 from surgsim.control.failure import ControlFailure
 from surgsim.control.planes import PlaneConfig
 from surgsim.control.qp import SHIPPED
@@ -24,7 +24,7 @@ trocar_or_none = pytest.mark.parametrize("trocar", [True, False])
 
 
 def _step(config, p):
-    resolver = config.build(problems.arm())
+    resolver = config.build(usual_arm())
     return resolver.step(p, resolver.start(p))[0]
 
 
@@ -53,7 +53,7 @@ def test_qp_and_vprnn_agree_where_no_bound_is_active(velocity_problem, seed, tro
         k_tip=vprnn.k1,
         k_rcm=vprnn.k2,
     )
-    network = vprnn.build(problems.arm())
+    network = vprnn.build(usual_arm())
     expected = network.step(p, network.start(p))[0].qdot
     assert (expected > p.lower).all()
     assert (expected < p.upper).all()
@@ -174,7 +174,7 @@ def test_joint_accelerations_are_limited_when_asked_to(scenario, limit):
 def test_the_memory_is_the_last_velocity_and_starts_at_the_measured_one(velocity_problem):
     p = velocity_problem(0, rcm_error_m=0.0, trocar_speed=0.0)
     p = replace(p, v=p.v - np.linalg.pinv(p.rcm.jacobian) @ p.rcm.jacobian @ p.v)
-    resolver = QpConfig().build(problems.arm())
+    resolver = QpConfig().build(usual_arm())
     answer, memory = resolver.step(p, resolver.start(p))
     np.testing.assert_array_equal(memory[:7], answer.qdot)
     assert (np.abs(answer.qdot - p.v) <= p.limits.acceleration * p.dt_s * (1 + 1e-9)).all()
@@ -197,7 +197,7 @@ def test_an_unknown_solver_is_refused_with_the_nearest_match():
 def test_the_kernel_is_the_same_without_its_decorator(velocity_problem):
     """Compiled code inside, the law itself as Python."""
     p = velocity_problem(0, speed=0.5, rcm_error_m=0.001)
-    resolver = QpConfig(acceleration_limit=False).build(problems.arm())
+    resolver = QpConfig(acceleration_limit=False).build(usual_arm())
     answer, memory = resolver.step(p, None)
     plain, remembered = replace(resolver, kernel=resolver.kernel.py_func).step(p, None)
     np.testing.assert_array_equal(plain.qdot, answer.qdot)

@@ -4,8 +4,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
+from usual_arm import usual_arm
 
-from surgsim.contract import problems
 from surgsim.control.failure import ControlFailure
 from surgsim.control.resolvers.rnn import RnnConfig
 from surgsim.errors import Outcome
@@ -35,7 +35,7 @@ class States:
 
 
 def _network(config):
-    return config.build(problems.arm())
+    return config.build(usual_arm())
 
 
 def _calm(p):

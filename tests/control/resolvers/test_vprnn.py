@@ -9,8 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 from scipy.linalg import null_space
+from usual_arm import usual_arm
 
-from surgsim.contract import problems
 from surgsim.control.failure import ControlFailure
 from surgsim.control.manipulability import jacobian_gradient
 from surgsim.control.rcm import rcm_cross_form
@@ -87,7 +87,7 @@ def _optimum(p):
 
 
 def _step(config, p, memory=None):
-    network = config.build(problems.arm())
+    network = config.build(usual_arm())
     return network.step(p, network.start(p) if memory is None else memory)
 
 
@@ -104,7 +104,7 @@ def test_default_gains_are_those_of_table_1():
 @seeds
 @pytest.mark.parametrize("rows", ["normal", "cross"])
 def test_system_is_eq_25(problem, rows):
-    network = Network(VprnnConfig(rcm_rows=rows), problems.arm(), problem)
+    network = Network(VprnnConfig(rcm_rows=rows), usual_arm(), problem)
     for built, literal in zip(
         (network.W, network.l), _literal_system(problem, cross=rows == "cross"), strict=True
     ):
@@ -160,7 +160,7 @@ def test_block_solve_equals_a_dense_solve_of_the_whole_system(velocity_problem, 
     p = _unbounded(velocity_problem(seed, trocar=trocar, t_s=0.3))
     W, l = _literal_system(p)  # noqa: E741
     delta = np.random.default_rng(seed).standard_normal(len(l))
-    network = VprnnConfig().build(problems.arm())
+    network = VprnnConfig().build(usual_arm())
     answer, memory = network.step(p, _memory(network, delta))
     after = memory[: len(delta)]
     np.testing.assert_allclose(answer.qdot, np.linalg.solve(W, l + after)[:7], atol=1e-8)
@@ -191,7 +191,7 @@ def _integrated(delta, start, period, beta, cap, bound):
 def test_step_of_delta_is_the_solution_of_eq_27(bound, start, cap):
     config = VprnnConfig(beta=1.3, exponent_cap=cap, activation_bound=bound)
     delta = np.array([-4.0, -0.31, -0.2, 0.0, 1e-3, 0.29, 0.9, 2.0])
-    stepped = decayed(config.build(problems.arm()).gains, delta, start, 0.6)
+    stepped = decayed(config.build(usual_arm()).gains, delta, start, 0.6)
     np.testing.assert_allclose(stepped, _integrated(delta, start, 0.6, 1.3, cap, bound), atol=2e-6)
 
 
@@ -202,7 +202,7 @@ def test_step_of_delta_is_the_solution_of_eq_27(bound, start, cap):
 )
 def test_two_half_steps_of_delta_equal_a_whole_one(delta, start, bound):
     config = VprnnConfig(beta=2.0, exponent_cap=3.0, activation_bound=bound)
-    gains = config.build(problems.arm()).gains
+    gains = config.build(usual_arm()).gains
     halves = decayed(gains, decayed(gains, np.array(delta), start, 0.01), start + 0.01, 0.01)
     whole = decayed(gains, np.array(delta), start, 0.02)
     np.testing.assert_allclose(halves, whole, rtol=1e-6, atol=1e-9)
@@ -212,7 +212,7 @@ def test_two_half_steps_of_delta_equal_a_whole_one(delta, start, bound):
 
 def _run(config, p, start_s, steps):
     """The answers of `steps` periods on a constant problem, from z = 0."""
-    network = config.build(problems.arm())
+    network = config.build(usual_arm())
     memory, answers = network.start(p), []
     for k in range(steps):
         answer, memory = network.step(replace(p, t_s=start_s + k * p.dt_s), memory)
@@ -253,7 +253,7 @@ def test_literal_euler_is_stable_only_until_the_gain_times_the_period_is_two(pro
 @pytest.mark.parametrize("bound", [None, 0.1])
 def test_a_run_of_a_million_seconds_does_not_overflow(problem, cap, bound):
     config = VprnnConfig(exponent_cap=cap, activation_bound=bound)
-    network = config.build(problems.arm())
+    network = config.build(usual_arm())
     answer, memory = network.step(replace(problem, t_s=1e6), _memory(network, np.ones(30)))
     np.testing.assert_allclose(answer.qdot, _optimum(problem), atol=1e-9)
     np.testing.assert_allclose(memory, 0.0, atol=1e-9)

@@ -4,17 +4,19 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from usual_arm import usual_arm
 
-from surgsim.contract import problems
 from surgsim.control.rcm import rcm_kinematics
-from surgsim.control.torque_laws.hierarchical_impedance import (
-    HierarchicalImpedanceConfig,
-)
+from surgsim.control.torque_laws.base import for_joints
+from surgsim.control.torque_laws.hierarchical_impedance import HierarchicalImpedanceConfig
+from surgsim.errors import SurgsimError
 
 TIP, RCM, JOINT, BIAS = range(4)
 UNEQUAL = HierarchicalImpedanceConfig(
     tip_stiffness_n_per_m=(1000.0, 2000.0, 3000.0), tip_damping_n_s_per_m=(10.0, 20.0, 30.0)
 )
+STIFFNESS = (80.0, 120.0, 60.0, 30.0, 20.0, 10.0, 10.0)
+DAMPING = (6.0, 10.0, 5.0, 3.0, 2.0, 1.0, 1.0)
 cases = pytest.mark.parametrize(("seed", "trocar"), [(0, True), (1, True), (2, False)])
 
 
@@ -24,7 +26,7 @@ def problem(torque_problem, seed, trocar):
 
 
 def _torque(problem, config=UNEQUAL):
-    law = config.build(problems.arm())
+    law = config.build(usual_arm())
     return law.torque(problem, law.start(problem))[0]
 
 
@@ -39,8 +41,8 @@ def _literal(p, c):
     p_dot = J_T @ p.v
     F = np.diag(c.tip_stiffness_n_per_m) @ (p.command.p_WTd - p.kin.p_WT)
     F = F + np.diag(c.tip_damping_n_s_per_m) @ (p.command.v_WTd - p_dot)
-    joint = np.diag(c.joint_stiffness_nm_per_rad) @ (p.q_ref - p.q)
-    joint = joint + np.diag(c.joint_damping_nm_s_per_rad) @ (p.resolution.qdot - p.v)
+    joint = np.diag(STIFFNESS) @ (p.q_ref - p.q)
+    joint = joint + np.diag(DAMPING) @ (p.resolution.qdot - p.v)
     if p.rcm is None:
         return np.array([J_T.T @ F, np.zeros(7), _projector(J_T, M) @ joint, p.dyn.bias])
     J_r = p.rcm.jacobian
@@ -55,14 +57,32 @@ def test_default_gains_are_those_of_table_1():
     assert c.tip_stiffness_n_per_m == (3000.0,) * 3
     assert c.tip_damping_n_s_per_m == (30.0,) * 3
     assert (c.rcm_stiffness_n_per_m, c.rcm_damping_n_s_per_m) == (800.0, 10.0)
-    assert c.joint_stiffness_nm_per_rad == (80.0, 120.0, 60.0, 30.0, 20.0, 10.0, 10.0)
-    assert c.joint_damping_nm_s_per_rad == (6.0, 10.0, 5.0, 3.0, 2.0, 1.0, 1.0)
+    gains = c.build(usual_arm()).gains
+    np.testing.assert_array_equal(gains[8:15], STIFFNESS)
+    np.testing.assert_array_equal(gains[15:], DAMPING)
+
+
+def test_on_other_arms_they_are_read_off_between_base_and_flange():
+    """Six joints are 6/5 places of the table apart, eight joints 6/7."""
+    six = [80.0, 108.0, 48.0, 24.0, 12.0, 10.0]
+    np.testing.assert_allclose(for_joints("k", None, STIFFNESS, 6), six, rtol=1e-12)
+    eight = for_joints("k", None, STIFFNESS, 8)
+    assert (eight[0], eight[-1], eight.size) == (80.0, 10.0, 8)
+    assert eight[1] == pytest.approx(80.0 + 40.0 * 6 / 7)
+    assert eight[4] == pytest.approx(30.0 - 10.0 * 3 / 7)
+
+
+def test_a_list_of_another_length_is_refused():
+    config = HierarchicalImpedanceConfig(joint_damping_nm_s_per_rad=(1.0,) * 6)
+    reason = r"^joint_damping_nm_s_per_rad has 6 items for an arm of 7 joints: give 7, or null$"
+    with pytest.raises(SurgsimError, match=reason):
+        config.build(usual_arm())
 
 
 @cases
 def test_terms_are_those_of_the_formula(problem):
     np.testing.assert_allclose(_torque(problem), _literal(problem, UNEQUAL), atol=1e-9)
-    assert UNEQUAL.build(problems.arm()).terms == ("tip", "rcm", "joint", "bias")
+    assert UNEQUAL.build(usual_arm()).terms == ("tip", "rcm", "joint", "bias")
 
 
 @cases

@@ -21,10 +21,12 @@ def test_what_acts_and_what_is_measured_is_off_by_the_bias_or_not(disturbed, of)
         np.testing.assert_allclose(seen.tau, command + 0.5 * measured, atol=1e-14)
 
 
-def test_signs_and_sizes_are_drawn_for_each_joint_from_the_seed():
+def test_signs_and_sizes_are_drawn_for_each_joint_from_the_seed(disturbed):
     def bias(seed):
         config = TorqueBiasConfig(bias_nm=0.4, of="sensor", signs="random", spread=0.5)
-        return config.build(np.random.default_rng(seed)).gains[7:]
+        scene, (part,) = disturbed.scene_of(config, seed=seed)
+        part.attach(scene, 0.001)
+        return part.gains[7:]
 
     drawn = np.array([bias(seed) for seed in range(30)])
     assert np.abs(drawn).min() >= 0.2

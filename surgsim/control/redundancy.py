@@ -1,0 +1,32 @@
+"""How many degrees of freedom a part of a controller needs beside those that its tasks take."""
+
+from typing import Any
+
+from surgsim.errors import SurgsimError
+from surgsim.models.arm import ArmModel
+
+
+def redundancy_needed(config: Any) -> int:
+    """Degrees of freedom that the part of `config` needs when the tip, and with a trocar the shaft, are held.
+
+    A config says it as `needs_redundancy`; 0 if it does not. The roll about the shaft does not count, see
+    `ArmModel.redundancy`.
+    """
+    return int(getattr(config, "needs_redundancy", 0))
+
+
+def check_redundancy(config: Any, arm: ArmModel, has_trocar: bool) -> None:
+    """Refuse a part that needs more than the arm has.
+
+    Raises:
+        SurgsimError: With the reason, in one line.
+    """
+    needed, left, joints = redundancy_needed(config), arm.redundancy(has_trocar), arm.limits.q_min.size
+    if config is None or left >= needed:
+        return
+    held = "tip and shaft are" if has_trocar else "the tip is"
+    free = f"{needed} degree{'s' if needed != 1 else ''} of freedom"
+    has = f"has {left or 'none'} left" if left >= 0 else f"is {-left} short of it"
+    roll = ", the roll about the shaft not counted" if arm.rolls_shaft else ""
+    text = f"'{config.type}' needs {free} while {held} held"
+    raise SurgsimError(f"{text}; an arm of {joints} joints {has}{roll}")
