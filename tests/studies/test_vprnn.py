@@ -174,6 +174,14 @@ def test_other_figures_change_the_verdicts(committed):
     ]
 
 
+@pytest.mark.parametrize(("integration", "outcome"), [("euler", "completed"), ("exact", "velocity_limit")])
+def test_either_form_that_ends_otherwise_turns_the_claim_about_euler(committed, integration, outcome):
+    arm = [dict(row) for row in committed["euler_arm"]]
+    stored(arm, plant="dynamic", integration=integration).update(outcome=outcome)
+    (claim,) = [c for c in STUDY.judge(committed | {"euler_arm": arm}) if c.text.startswith("explicit Euler")]
+    assert claim.verdict == "does not hold"
+
+
 def test_vprnn_at_the_paper_s_size_stays_just_inside_the_paper_s_bounds(committed):
     row = stored(committed["comparison"], level=str(PAPER_SIZE), controller=LABEL["vprnn"])
     assert 2.0 < row["tip_max_mm"] < 5.0
