@@ -8,11 +8,12 @@ from typing import TYPE_CHECKING
 from surgsim.cli.paths import path_argument
 
 if TYPE_CHECKING:
-    from surgsim.studies.study import StudyResult
+    from surgsim.studies.engine import StudyResult
 
 HELP = "make a paper's tables and figures again and check its claims"
 EXAMPLES = """Tables go to CSV and Markdown, figures to PNG; README.md in the folder explains them. The folder
-appears when the study is whole. A claim that does not hold is a result, not an error: the exit status is 0.
+appears when the study is whole; the same command goes on with one that was interrupted. A claim that does
+not hold is a result, not an error: the exit status is 0.
 
 examples:
   surgsim reproduce manipulability_validation
@@ -40,12 +41,14 @@ def execute(options: argparse.Namespace) -> int:
     """Run the study, write its folder, print the main table and every claim."""
     from surgsim.runs.folder import whole_folder
     from surgsim.studies import load_study
+    from surgsim.studies.engine import run_study
+    from surgsim.studies.kept import kept_until_whole
 
-    run = load_study(options.study)
+    study = load_study(options.study)
     folder = options.out or Path("results") / (f"{options.study}_quick" if options.quick else options.study)
     _check_target(folder)
-    with whole_folder(folder) as draft:
-        result = run(draft, options.quick, _say)
+    with kept_until_whole(folder) as kept, whole_folder(folder) as draft:
+        result = run_study(study, draft, options.quick, _say, kept)
     if options.json:
         _print_json(options.study, result)
     else:
@@ -87,7 +90,7 @@ def _print_json(study: str, result: "StudyResult") -> None:
 
 def _print(study: str, result: "StudyResult") -> None:
     from surgsim.cli.table import print_beside, print_table
-    from surgsim.studies.study import format_cell
+    from surgsim.studies.tables import format_cell
 
     name, rows = next(iter(result.tables.items()))
     header = list(rows[0])

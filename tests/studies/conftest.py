@@ -1,6 +1,6 @@
 import pytest
 
-from surgsim.studies.study import read_csv
+from surgsim.studies.tables import read_csv
 
 
 def _value(text):
@@ -16,6 +16,6 @@ def read_numbers():
     """Reads the rows of a study's CSV file, with numbers as numbers."""
 
     def read(path):
-        return [{name: _value(text) for name, text in row.items()} for row in read_csv(path)]
+        return read_csv(path, _value)
 
     return read

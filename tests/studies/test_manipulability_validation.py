@@ -9,19 +9,13 @@ from surgsim.metrics.accuracy import rms
 from surgsim.models.arm import ArmModel
 from surgsim.models.config import RobotConfig, SceneConfig
 from surgsim.studies import manipulability_validation as study
-from surgsim.studies.manipulability_validation import calibrate, paper, runs
-from surgsim.studies.manipulability_validation.claims import claims_of, within_limits
-from surgsim.studies.manipulability_validation.setup import (
-    HOMES_RAD,
-    PERIOD_S,
-    STEPS,
-    Cell,
-    prepared,
-    scenario,
-)
+from surgsim.studies.engine import run_study
+from surgsim.studies.manipulability_validation import STUDY, calibrate, cases, within_limits
+from surgsim.studies.manipulability_validation.calibrate import HOMES_RAD, STEPS
+from surgsim.studies.manipulability_validation.cases import HOMES, PAPER, PATHS, PERIOD_S, Cell
 
 RESULTS = Path(__file__).resolve().parents[2] / "results" / "manipulability_validation"
-CELLS = [(path, home) for path in paper.PATHS for home in paper.HOMES]
+CELLS = [(path, home) for path in PATHS for home in HOMES]
 
 
 @pytest.fixture(scope="module")
@@ -34,7 +28,7 @@ def committed(read_numbers):
 def remade(tmp_path_factory, read_numbers):
     """Tables of two cells, made now."""
     out = tmp_path_factory.mktemp("quick")
-    study.run(out, True, lambda line: None)
+    run_study(STUDY, out, True, lambda line: None)
     return {path.stem: read_numbers(path) for path in out.glob("*.csv")}
 
 
@@ -67,8 +61,8 @@ def test_every_average_of_table_4_is_within_one_percent_of_the_paper(committed):
     rows = by_cell(committed["table_4"])
     assert list(rows) == CELLS
     for (path, home), row in rows.items():
-        assert row["pinv"] == pytest.approx(paper.TABLE_4_NOT_OPTIMISED[path][home - 1], rel=0.01)
-        assert row["rnn"] == pytest.approx(paper.TABLE_4_OPTIMISED[path][home - 1], rel=0.01)
+        assert row["pinv"] == pytest.approx(PAPER["pinv"][path][home - 1], rel=0.01)
+        assert row["rnn"] == pytest.approx(PAPER["rnn"][path][home - 1], rel=0.01)
 
 
 def test_every_increase_is_positive(committed):
@@ -98,28 +92,25 @@ def test_matched_errors_are_the_drift_and_lagged_ones_about_a_step(committed):
 def test_the_network_as_printed_diverges_where_the_table_says(committed):
     rows = committed["printed_network"]
     assert [row["outcome"] for row in rows] == 5 * ["diverged"] + ["completed"]
-    circle = Cell(path="circle", home=1, method="rnn")
-    for keys, row in zip(runs.PRINTED_NETWORKS[:3], rows, strict=False):
-        trace = runs.run_cell(circle, **keys)
+    for case, row in zip(cases.PRINTED_NETWORKS[:3], rows, strict=False):
+        trace = case.run()
         assert trace.meta.ending.outcome.name == "DIVERGED"
         assert round(trace.meta.ending.t_s / PERIOD_S) == row["last_step"]
 
 
 def test_the_paper_s_increases_are_the_differences_of_its_averages():
-    for path in paper.PATHS:
-        base, optimised = (
-            np.array(table[path]) for table in (paper.TABLE_4_NOT_OPTIMISED, paper.TABLE_4_OPTIMISED)
-        )
-        np.testing.assert_allclose(optimised - base, paper.TABLE_4_INCREASE[path], atol=1.01e-4)
+    for path in PATHS:
+        base, optimised = (np.array(PAPER[name][path]) for name in ("pinv", "rnn"))
+        np.testing.assert_allclose(optimised - base, PAPER["increase"][path], atol=1.01e-4)
         percent = 100.0 * (optimised / base - 1.0)
-        np.testing.assert_allclose(percent, paper.TABLE_4_INCREASE_PERCENT[path], atol=0.45)
+        np.testing.assert_allclose(percent, PAPER["percent"][path], atol=0.45)
 
 
 def test_the_runs_agree_with_the_independent_model_of_the_calibration(committed):
-    found, margin = calibrate.averages(np.array([HOMES_RAD[home][:6] for home in paper.HOMES]), STEPS)
+    found, margin = calibrate.averages(np.array([HOMES_RAD[home][:6] for home in HOMES]), STEPS)
     rows = by_cell(committed["table_4"])
-    for column, path in enumerate(paper.PATHS):
-        for home in paper.HOMES:
+    for column, path in enumerate(PATHS):
+        for home in HOMES:
             assert rows[path, home]["pinv"] == pytest.approx(found[home - 1, column], rel=1e-5)
             steady = found[home - 1, 3 + column]
             assert rows[path, home]["rnn"] == pytest.approx(steady, rel=5e-3)
@@ -141,16 +132,16 @@ def test_the_calibration_s_kinematics_are_the_arm_s():
 
 def test_refinement_finds_a_home_again():
     home = 3
-    target = calibrate.table_4_averages(home)
+    target = cases.table_4_averages(home)
     start = np.array([HOMES_RAD[home][:6]]) + 0.02
     (q,) = calibrate.refine(start, target, 60, 6)
     before, after = (np.abs(calibrate.averages(x, 60)[0] / target - 1.0).max() for x in (start, q[None]))
     assert after < 1e-3 < before
 
 
-@pytest.mark.parametrize("path", paper.PATHS)
+@pytest.mark.parametrize("path", PATHS)
 def test_the_velocity_of_a_step_leads_from_sample_to_sample(path):
-    task = prepared(Cell(path=path, home=2, method="pinv")).task
+    task = Cell(path=path, home=2, method="pinv").setup().task
     commands = [task.command(k * PERIOD_S) for k in range(STEPS + 1)]
     points = np.array([command.p_WTd for command in commands])
     steps = PERIOD_S * np.array([command.v_WTd for command in commands])
@@ -164,9 +155,10 @@ def test_the_velocity_of_a_step_leads_from_sample_to_sample(path):
 def test_errors_with_matched_and_lagged_indices(trace_of):
     tip = np.column_stack([np.arange(5.0), np.zeros(5), np.zeros(5)])
     trace = trace_of(5, tip=tip, tip_ref=tip + np.array([0.0, 2.0, 0.0]))
-    np.testing.assert_allclose(runs.matched_errors(trace), 2.0)
-    np.testing.assert_allclose(runs.lagged_errors(trace), np.hypot(1.0, 2.0))
-    assert rms(runs.matched_errors(trace)) == pytest.approx(2.0)
+    matched, lagged = cases.tip_errors(trace)
+    np.testing.assert_allclose(matched, 2.0)
+    np.testing.assert_allclose(lagged, np.hypot(1.0, 2.0))
+    assert rms(matched) == pytest.approx(2.0)
 
 
 def test_the_acceleration_from_rest_counts(trace_of):
@@ -174,11 +166,11 @@ def test_the_acceleration_from_rest_counts(trace_of):
     v[1:, 2] = 0.008
     trace = trace_of(3, v=v)
     limit = trace.meta.limits["acceleration"][2]
-    assert runs.acceleration_ratio(trace) == pytest.approx(8.0 / limit)
+    assert cases.acceleration_ratio(trace) == pytest.approx(8.0 / limit)
 
 
 def test_a_worse_result_changes_the_verdicts(committed):
-    verdicts = {claim.text: claim.verdict for claim in claims_of(committed)}
+    verdicts = {claim.text: claim.verdict for claim in STUDY.judge(committed)}
     assert sum(verdict == "holds" for verdict in verdicts.values()) == 7
     spoilt = {name: [dict(row) for row in rows] for name, rows in committed.items()}
     spoilt["table_4"][0]["pinv_off_percent"] = 1.2
@@ -187,20 +179,18 @@ def test_a_worse_result_changes_the_verdicts(committed):
     spoilt["attainable"][2]["acceleration_over_limit"] = 1.01
     for row in spoilt["attainable"]:
         row["tip_rms_m"] = 2e-5
-    changed = [claim for claim in claims_of(spoilt) if claim.verdict != verdicts[claim.text]]
+    changed = [claim for claim in STUDY.judge(spoilt) if claim.verdict != verdicts[claim.text]]
     assert sorted(claim.verdict for claim in changed) == [*4 * ["depends"], "does not hold"]
     assert "11 of 12 cells" in changed[0].evidence
 
 
 def test_the_scenarios_are_the_paper_s_setting():
-    found = scenario(Cell(path="circle", home=4, method="rnn"))
+    found = Cell(path="circle", home=4, method="rnn").scenario()
     assert (found.instrument, found.trocar, found.plant.type) == (None, None, "kinematic")
     assert found.task.duration_s / found.simulation.control_period_s == pytest.approx(STEPS)
     assert found.controller.resolver.k_tip == 0.0
-    assert (
-        scenario(Cell(path="circle", home=4, method="pinv", dh_variant="literal")).robot.dh_variant
-        == "literal"
-    )
+    literal = Cell(path="circle", home=4, method="pinv", dh_variant="literal").scenario()
+    assert literal.robot.dh_variant == "literal"
 
 
 def test_the_committed_folder_is_whole_and_small():
@@ -215,7 +205,7 @@ def test_the_committed_folder_is_whole_and_small():
 
 @pytest.mark.slow
 def test_everything_made_again_gives_the_committed_tables(tmp_path, committed, read_numbers):
-    result = study.run(tmp_path, False, lambda line: None)
+    result = run_study(STUDY, tmp_path, False, lambda line: None)
     assert sorted(path.name for path in tmp_path.iterdir()) == sorted(result.files)
     assert {path.name for path in RESULTS.iterdir()} == set(result.files)
     for name, rows in committed.items():

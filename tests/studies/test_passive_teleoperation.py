@@ -9,7 +9,9 @@ import numpy as np
 import pytest
 
 from surgsim.simulate.loop import simulate
-from surgsim.studies import STUDIES, load_study, passive_teleoperation
+from surgsim.studies import STUDIES, load_study
+from surgsim.studies.engine import measure_cases, run_study
+from surgsim.studies.passive_teleoperation import STUDY
 from surgsim.studies.passive_teleoperation.cases import (
     DELAYS_MS,
     GRIPS,
@@ -19,15 +21,11 @@ from surgsim.studies.passive_teleoperation.cases import (
     SHIPPED,
     Push,
     Shipped,
+    Timed,
+    beside_the_paper,
     sweep,
 )
-from surgsim.studies.passive_teleoperation.claims import paper_claims
-from surgsim.studies.passive_teleoperation.frontier import frontier_table, worst
-from surgsim.studies.passive_teleoperation.own_claims import own_claims
-from surgsim.studies.passive_teleoperation.paper import beside_the_paper
-from surgsim.studies.passive_teleoperation.runs import run_case, run_cases
-from surgsim.studies.passive_teleoperation.stability import steadiness
-from surgsim.studies.passive_teleoperation.timing import timed
+from surgsim.studies.passive_teleoperation.measures import frontier_table, steadiness, worst
 
 RESULTS = Path(__file__).resolve().parents[2] / "results" / "passive_teleoperation"
 TABLES = ("paper", "scenarios", "comparison", "frontier", "pushes", "timing")
@@ -118,6 +116,14 @@ def tables():
         "comparison": pushes,
         "timing": [{"qp_p50_us": 80.0, "qp_p99_us": 150.0}],
     }
+
+
+def paper_claims(tables):
+    return [claim for claim in STUDY.judge(tables) if claim.source != "surgsim"]
+
+
+def own_claims(tables):
+    return [claim for claim in STUDY.judge(tables) if claim.source == "surgsim"]
 
 
 def verdicts(claims):
@@ -270,14 +276,14 @@ def test_two_processes_give_the_same_rows_as_one():
         Push(place=place, passivity="tank", grip="light", delay_ms=100, cut_s=0.3)
         for place in ("wall", "free")
     ]
-    one, two = (run_cases(cases, workers, lambda line: None) for workers in (1, 2))
-    assert [done.row for done in one] == [done.row for done in two]
-    assert [done.case for done in two] == cases
+    one, two = (measure_cases(cases, lambda line: None, workers) for workers in (1, 2))
+    assert [one[case].row for case in cases] == [two[case].row for case in cases]
+    assert list(two) == cases
 
 
 def test_timing_the_qp_does_not_change_the_motion():
-    scenario = Shipped(name="free motion", keys=("task.duration_s=0.3",)).scenario()
-    plain, watched = simulate(scenario), simulate(timed(scenario))
+    shipped = Shipped(name="free motion", keys=("task.duration_s=0.3",))
+    plain, watched = simulate(shipped.scenario()), Timed(shipped).run()
     np.testing.assert_array_equal(plain.block("v"), watched.block("v"))
     assert np.all(watched["qp_time_s"] > 0.0)
     assert np.all(watched["qp_time_s"] < watched["control_time_s"])
@@ -303,12 +309,12 @@ def test_quick_through_the_command(tmp_path):
 
 
 def test_the_command_knows_the_study():
-    assert load_study("passive_teleoperation") is passive_teleoperation.run
+    assert load_study("passive_teleoperation") is STUDY
     assert "passive_teleoperation" in STUDIES
 
 
 def test_a_push_made_again_gives_the_committed_row(committed):
-    row = run_case(PUSH).row
+    row = PUSH.measured().row
     wanted = {key: row[key] for key in ("place", "grip", "link", "delay_ms", "passivity")}
     (stored,) = [other for other in committed["pushes"] if wanted.items() <= other.items()]
     assert list(row) == list(stored)
@@ -318,7 +324,7 @@ def test_a_push_made_again_gives_the_committed_row(committed):
 
 
 def test_the_committed_page_shows_every_claim(committed):
-    claims = [*paper_claims(committed), *own_claims(committed)]
+    claims = STUDY.judge(committed)
     assert len(claims) == 16
     page = (RESULTS / "README.md").read_text()
     assert "    surgsim reproduce passive_teleoperation\n" in page
@@ -340,6 +346,6 @@ def test_the_committed_sweep_is_whole(committed):
 
 @pytest.mark.slow
 def test_everything_made_again_gives_the_same_ends(tmp_path, committed, read_numbers):
-    passive_teleoperation.run(tmp_path, False, lambda line: None)
+    run_study(STUDY, tmp_path, False, lambda line: None)
     again = read_numbers(tmp_path / "frontier.csv")
     assert again == committed["frontier"]

@@ -6,14 +6,27 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from surgsim.studies import STUDIES, load_study, vprnn
-from surgsim.studies.vprnn import comparison, network, starts
-from surgsim.studies.vprnn.cases import METHODS, NOMINAL, PAPER_SIZE, Level, scenario
-from surgsim.studies.vprnn.claims import paper_claims
-from surgsim.studies.vprnn.disturbances import GRID, OURS, ladder_row
-from surgsim.studies.vprnn.equations import Network
-from surgsim.studies.vprnn.euler import CELLS, arm_row, euler_row, limit_s
-from surgsim.studies.vprnn.own_claims import own_claims
+from surgsim.control.manipulability import diamond, jacobian_gradient
+from surgsim.control.problem import stacked_rows
+from surgsim.simulate.setup import prepare
+from surgsim.studies import STUDIES, load_study
+from surgsim.studies.engine import run_study
+from surgsim.studies.study import Results
+from surgsim.studies.vprnn import STUDY, networks
+from surgsim.studies.vprnn.cases import (
+    GRID,
+    LABEL,
+    METHODS,
+    OURS,
+    PAPER_SIZE,
+    SPREADS,
+    VARIANTS,
+    Level,
+    Sinusoid,
+    Start,
+    integrated,
+    sinusoid,
+)
 
 RESULTS = Path(__file__).resolve().parents[2] / "results" / "vprnn"
 TABLES = tuple(sorted(path.stem for path in RESULTS.glob("*.csv")))
@@ -37,7 +50,7 @@ def committed(read_numbers):
 
 @pytest.fixture(scope="module")
 def at():
-    return network.instant()
+    return networks.instant()
 
 
 def stored(rows, **wanted):
@@ -61,40 +74,58 @@ def assert_same(row, other, tolerance=1e-6):
             assert value == other[name], name
 
 
+def made_again(table, case, group=None):
+    """The row of a table that a case gives."""
+    results = Results({group or table: [case]}, {case: case.measured()})
+    (row,) = STUDY.tables[table](results)
+    return row
+
+
 @pytest.mark.parametrize("name", ["vprnn", "rcm_inverse_dynamics"])
 def test_the_nominal_run_made_again_gives_the_committed_row(committed, name):
-    trace = comparison.run_case(METHODS[name], NOMINAL)
-    label = METHODS[name].label
-    row = comparison.comparison_row(name, NOMINAL, trace)
-    assert_same(row, stored(committed["comparison"], level="nominal", controller=label))
-    reused = ladder_row(name, NOMINAL, {(name, NOMINAL): trace})
-    assert_same(reused, stored(committed["ladder"], controller=label, payload_kg=0.0, friction_nm=0.0))
+    row = made_again("comparison", Sinusoid(name))
+    assert_same(row, stored(committed["comparison"], level="nominal", controller=LABEL[name]))
+    row = made_again("ladder", Sinusoid(name))
+    assert_same(row, stored(committed["ladder"], controller=LABEL[name], payload_kg=0.0, friction_nm=0.0))
 
 
 def test_a_cell_of_the_ladder_made_again_gives_the_committed_row(committed):
-    row = ladder_row("vprnn", Level(payload_kg=1.0), {})
-    label = METHODS["vprnn"].label
+    row = made_again("ladder", Sinusoid("vprnn", Level(payload_kg=1.0)))
+    label = LABEL["vprnn"]
     assert_same(row, stored(committed["ladder"], controller=label, payload_kg=1.0, friction_nm=0.0), 1e-5)
     assert row["within_5_and_15_mm"] == "no"
 
 
+def test_the_largest_errors_are_seen_to_the_end(committed):
+    row = made_again("ladder", Sinusoid("vprnn", Level(coulomb_nm=5.0)))
+    assert row["outcome"] == "completed"
+    assert row["rcm_max_mm"] > 100.0
+    label = LABEL["vprnn"]
+    assert_same(row, stored(committed["ladder"], controller=label, payload_kg=0.0, friction_nm=5.0), 1e-5)
+
+
+def test_a_run_that_is_stopped_is_measured_until_its_stop():
+    row = made_again("euler_arm", integrated("dynamic", "euler"))
+    assert row["outcome"] == "diverged"
+    assert all(math.isfinite(row[name]) for name in row if name.endswith("_mm"))
+
+
 def test_a_random_start_made_again_gives_the_committed_row(committed):
-    setup = starts.prepared("vprnn", "dynamic")
-    trace = starts.run_start(setup, starts.SPREADS["near"], 3)
-    row = starts.start_row("vprnn", "dynamic", "near", 3, trace)
-    wanted = {"controller": METHODS["vprnn"].label, "plant": "dynamic", "spread": "near", "seed": 3.0}
+    row = made_again("starts_every_run", Start("vprnn", "dynamic", "near", 3), "starts")
+    wanted = {"controller": LABEL["vprnn"], "plant": "dynamic", "spread": "near", "seed": 3.0}
     assert_same(row, stored(committed["starts_every_run"], **wanted), 1e-5)
 
 
-def test_the_networks_made_again_give_the_committed_rows(committed, at):
-    assert_same(network.rate_row(at, 1), stored(committed["network_rates"], seed=1.0))
-    for bound in network.BOUNDS:
-        row = network.theorem_row(at, 2, bound)
+def test_the_networks_made_again_give_the_committed_rows(committed):
+    settling = made_again("network_rates", networks.Settling(1))
+    assert_same(settling, stored(committed["network_rates"], seed=1.0))
+    for bound in networks.BOUNDS:
+        row = made_again("theorem_1", networks.Theorem(bound, 2))
         assert_same(row, stored(committed["theorem_1"], seed=2.0, activation=row["activation"]))
 
 
 def test_every_claim_has_a_verdict_and_the_page_shows_it(committed):
-    claims = [*paper_claims(committed), *own_claims(committed)]
+    claims = STUDY.judge(committed)
     assert len(claims) == 15
     page = (RESULTS / "README.md").read_text()
     for claim in claims:
@@ -119,16 +150,16 @@ def test_every_claim_has_a_verdict_and_the_page_shows_it(committed):
 def test_other_figures_change_the_verdicts(committed):
     spoilt = {name: [dict(row) for row in rows] for name, rows in committed.items()}
     for row in spoilt["comparison"]:
-        if row["controller"] == METHODS["vprnn"].label:
+        if row["controller"] == LABEL["vprnn"]:
             row.update(tip_rms_mm=1e-4, rcm_rms_mm=1e-4, mu_mean=1.0)
-        if row["controller"] == METHODS["rnn"].label:
+        if row["controller"] == LABEL["rnn"]:
             row.update(tip_max_mm=6.0)
     stored(spoilt["gains"], variant="RNN, Table I").update(tip_rms_mm=1e-4, rcm_rms_mm=1e-4, mu_mean=1.0)
     spoilt["theorem_1"][3]["V_falls_at_every_step"] = "no"
     spoilt["network_rates"][0]["vprnn_1_percent_s"] = 10.0
     for row in spoilt["starts"]:
         row["converged"] = row["runs"]
-    verdicts = [claim.verdict for claim in paper_claims(spoilt)]
+    verdicts = [claim.verdict for claim in STUDY.judge(spoilt) if claim.source != "surgsim"]
     assert verdicts == [
         "does not hold",
         "depends",
@@ -143,8 +174,16 @@ def test_other_figures_change_the_verdicts(committed):
     ]
 
 
+@pytest.mark.parametrize(("integration", "outcome"), [("euler", "completed"), ("exact", "velocity_limit")])
+def test_either_form_that_ends_otherwise_turns_the_claim_about_euler(committed, integration, outcome):
+    arm = [dict(row) for row in committed["euler_arm"]]
+    stored(arm, plant="dynamic", integration=integration).update(outcome=outcome)
+    (claim,) = [c for c in STUDY.judge(committed | {"euler_arm": arm}) if c.text.startswith("explicit Euler")]
+    assert claim.verdict == "does not hold"
+
+
 def test_vprnn_at_the_paper_s_size_stays_just_inside_the_paper_s_bounds(committed):
-    row = stored(committed["comparison"], level=PAPER_SIZE.name, controller=METHODS["vprnn"].label)
+    row = stored(committed["comparison"], level=str(PAPER_SIZE), controller=LABEL["vprnn"])
     assert 2.0 < row["tip_max_mm"] < 5.0
     assert 12.0 < row["rcm_max_mm"] < 15.0
 
@@ -158,37 +197,53 @@ def test_no_run_of_the_comparison_or_the_ladder_failed(committed):
 
 def test_both_networks_end_at_the_formula(at):
     for rate, velocities in (
-        (0.01, network.vprnn_velocities(at, 5, 40)),
-        (1.0, network.rnn_velocities(at, 5, 3000)),
+        (0.01, networks.vprnn_velocities(at, 5, 40)),
+        (1.0, networks.rnn_velocities(at, 5, 3000)),
     ):
-        end = network.optimum(at.problem, rate)
-        other = network.optimum(at.problem, 1.01 - rate)
+        end = networks.optimum(at.problem, rate)
+        other = networks.optimum(at.problem, 1.01 - rate)
         assert np.linalg.norm(velocities[-1] - end) < 1e-8
         assert np.linalg.norm(velocities[-1] - other) > 1e-2
 
 
+def rnn_modes(at):
+    """Eigenvalues [1/s] of the RNN inside its bounds, slowest first: x' = (A x + b) / epsilon."""
+    c, kin = at.rnn, at.problem.kin
+    J, _ = stacked_rows(at.problem, c.k_tip, c.k_rcm)
+    D = diamond(kin.Jv_WT, jacobian_gradient(kin.Jv_WT, kin.z_W))
+    B, m = np.kron(np.eye(3), kin.Jv_WT @ kin.Jv_WT.T), len(J)
+    A = np.zeros((25 + m, 25 + m))
+    omega, phi, lam, sigma = slice(0, 7), slice(7, 16), slice(16, 16 + m), slice(16 + m, 25 + m)
+    A[omega, omega], A[omega, phi] = -c.c2 * np.eye(7) - c.c0 * J.T @ J, c.c3 * D
+    A[omega, lam], A[phi, omega] = -J.T, c.c3 * D.T
+    A[phi, phi], A[phi, sigma] = -c.c1 * B @ B, B
+    A[lam, omega], A[sigma, phi] = J, -B
+    modes = np.linalg.eigvals(A) / c.epsilon_s
+    return modes[np.argsort(-modes.real)]
+
+
 def test_the_slowest_self_motion_mode_of_the_rnn_is_c2_over_epsilon(at):
-    modes = network.rnn_modes(at)
+    modes = rnn_modes(at)
     assert max(modes.real) < 0.0
     assert np.min(np.abs(modes + at.rnn.c2 / at.rnn.epsilon_s)) < 1e-6
 
 
 def test_the_cross_product_rows_make_w_singular(at):
-    assert network.cross_form_rank(at) == (30, 31)
-    W = Network(at.vprnn, at.arm, at.problem).W
+    assert networks.cross_form_rank(at) == (30, 31)
+    W = at.network().W
     assert np.linalg.matrix_rank(W) == len(W) == 30
 
 
 def test_the_limit_is_where_a_step_turns_from_shrinking_to_growing():
-    for beta, period in CELLS:
-        t = limit_s(period, beta)
+    for beta, period in networks.EULER:
+        t = networks.Euler(beta, period).limit_s
         assert abs(1.0 - period * beta * math.exp(t - 1e-6)) < 1.0
         assert abs(1.0 - period * beta * math.exp(t + 1e-6)) > 1.0
-    assert limit_s(1e-3, 1000.0) == pytest.approx(math.log(2.0))
+    assert networks.Euler(1000.0, 1e-3).limit_s == pytest.approx(math.log(2.0))
 
 
-def test_euler_breaks_at_the_limit_and_the_closed_form_does_not(committed, at):
-    row = euler_row(at, 1000.0, 1e-3)
+def test_euler_breaks_at_the_limit_and_the_closed_form_does_not(committed):
+    row = made_again("euler", networks.Euler(1000.0, 1e-3))
     assert_same(row, stored(committed["euler"], beta_per_s=1000.0, period_ms=1.0))
     assert row["grows_from_s"] == pytest.approx(math.log(2.0), abs=0.05)
     assert row["above_its_start_s"] > math.log(2.0)
@@ -196,14 +251,14 @@ def test_euler_breaks_at_the_limit_and_the_closed_form_does_not(committed, at):
 
 
 def test_the_arm_with_euler_diverges(committed):
-    row = arm_row("kinematic", "euler")
+    row = made_again("euler_arm", integrated("kinematic", "euler"))
     assert_same(row, stored(committed["euler_arm"], plant="kinematic", integration="euler"))
     assert row["outcome"] == "diverged"
 
 
 def test_a_start_is_displaced_as_asked_and_the_same_for_every_controller():
-    setups = [starts.prepared(name, "kinematic") for name in ("vprnn", "rnn")]
-    for name, spread in starts.SPREADS.items():
+    setups = [prepare(Start(name, "kinematic", "near", 7).scenario()) for name in ("vprnn", "rnn")]
+    for name, spread in SPREADS.items():
         q, again = (spread.draw(setup, 7) for setup in setups)
         np.testing.assert_array_equal(q, again)
         kin = setups[0].arm.kinematics(q)
@@ -211,26 +266,19 @@ def test_a_start_is_displaced_as_asked_and_the_same_for_every_controller():
         assert spread.tip_mm[0] <= tip <= spread.tip_mm[1], name
 
 
-def test_convergence_time_counts_from_the_last_excursion():
-    t = np.arange(5.0)
-    assert starts.within_from_s(t, np.array([3.0, 1.0, 2.0, 0.5, 0.1]), 1.0) == 3.0
-    assert starts.within_from_s(t, np.array([3.0, 1.0, 2.0, 0.5, 1.1]), 1.0) is None
-    assert starts.within_from_s(t, np.zeros(5), 1.0) == 0.0
-
-
 def test_levels_are_the_disturbances_of_the_scenario():
     level = Level(payload_kg=0.25, coulomb_nm=2.0)
-    payload, friction = scenario(METHODS["vprnn"], level).disturbances
+    payload, friction = sinusoid("vprnn", level).disturbances
     assert (payload.mass_kg, friction.coulomb_nm) == (0.25, 2.0)
-    assert scenario(METHODS["vprnn"]).disturbances == ()
+    assert sinusoid("vprnn").disturbances == ()
 
 
 def test_table_i_is_what_runs():
-    resolver = scenario(METHODS["vprnn"]).controller.resolver
+    resolver = sinusoid("vprnn").controller.resolver
     assert (resolver.h0, resolver.h1, resolver.h2, resolver.h3, resolver.h4) == (0.1, 10.0, 50.0, 30.0, 30.0)
-    rnn = scenario(METHODS["rnn"]).controller.resolver
+    rnn = sinusoid("rnn").controller.resolver
     assert (rnn.c3, rnn.c2, rnn.c0, rnn.c1) == (0.01, 0.01, 1.0, 1.0)
-    (none, *_, fast) = [v for v in comparison.VARIANTS if v.method == "nullspace"]
+    (none, *_, fast) = [v for v in VARIANTS if v.method == "nullspace"]
     assert (none.rate, fast.rate) == (0.0, 10.0)
 
 
@@ -245,13 +293,13 @@ def test_the_committed_folder_is_whole_and_small():
 
 
 def test_the_command_knows_the_study():
-    assert load_study("vprnn") is vprnn.run
+    assert load_study("vprnn") is STUDY
     assert "vprnn" in STUDIES
 
 
 @pytest.mark.slow
 def test_everything_made_again_gives_the_committed_tables(tmp_path, committed, read_numbers):
-    result = vprnn.run(tmp_path, False, lambda line: None)
+    result = run_study(STUDY, tmp_path, False, lambda line: None)
     assert sorted(path.name for path in tmp_path.iterdir()) == sorted(result.files)
     assert {path.name for path in RESULTS.iterdir()} == set(result.files)
     for name, rows in committed.items():
@@ -262,7 +310,7 @@ def test_everything_made_again_gives_the_committed_tables(tmp_path, committed, r
 
 @pytest.mark.slow
 def test_a_quick_study_gives_every_claim_a_verdict(tmp_path):
-    result = vprnn.run(tmp_path, True, lambda line: None)
+    result = run_study(STUDY, tmp_path, True, lambda line: None)
     assert {claim.verdict for claim in result.claims} <= {"holds", "does not hold", "depends"}
     assert len(result.claims) == 14
     assert sorted(path.name for path in tmp_path.iterdir()) == sorted(result.files)

@@ -1,21 +1,39 @@
-"""How the homes were found: least squares on the six averages that Table 4 gives for each of them.
+"""The homes, and how they were found: least squares on the six averages that Table 4 gives for each of them.
 
     from surgsim.studies.manipulability_validation.calibrate import search
-    for candidate in search(home=3, seed=1): print(candidate)
+    from surgsim.studies.manipulability_validation.cases import table_4_averages
+    for candidate in search(table_4_averages(home=3), seed=1): print(candidate)
 
-takes about a minute a home. Homes 1 and 3 of `setup.py` are its first candidates with seed 1. Everything is
+takes about a minute a home. Homes 1 and 3 are its first candidates with seed 1. Everything is
 evaluated for many homes at once on a kinematic model of its own, so that it also checks the study's runs.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from surgsim.studies.manipulability_validation import paper
+from surgsim.studies.study import Array, Case, Measured
+from surgsim.studies.tables import Row
 
-Array = NDArray[np.float64]
+HOMES_RAD: dict[int, tuple[float, ...]] = {
+    1: (-1.4554, 0.2298, -1.4327, 1.1228, -1.0211, -0.7746, 0.0),
+    2: (-2.6363, -0.2700, -1.0263, -0.6707, 1.7487, -1.4718, 0.0),
+    3: (-0.4316, 0.4505, -2.3141, -0.2694, 1.5694, -1.8793, 0.0),
+    4: (-0.1466, 0.0373, -1.3932, -1.7828, 0.7078, 1.3767, 0.0),
+}
+"""Joint positions q1..q7 [rad]. The paper does not print its own; q7 moves neither flange nor mu."""
 
+GIVEN_UP_HOMES_RAD: dict[int, tuple[float, ...]] = {
+    1: (2.6604, 0.2809, 1.9706, -1.7499, 0.2555, -1.0495, 0.0),
+    3: (0.7051, 0.4350, -2.6527, 0.0696, 1.2719, -1.9953, 0.0),
+}
+"""Homes of an earlier search that leave the joint range along the sinusoid."""
+
+_SEARCH = "seeded search of calibrate.py, every run inside the joint limits"
+_EARLIER = "an earlier search with the same objective without the joint limits; its runs are inside them"
+HOME_SOURCES: dict[int, str] = {1: _SEARCH, 2: _EARLIER, 3: _SEARCH, 4: _EARLIER}
+
+STEPS = 1000
 GAIN = 0.4
 """(c3/c2) T [s]: with the homes, the only constant that the averages depend on."""
 
@@ -23,6 +41,25 @@ MARGIN_RAD = 0.02
 LINK_OFFSETS_M = (0.31, 0.0, 0.4, 0.0, 0.39, 0.0, 0.078)
 _TWIST_SIGNS = (1.0, -1.0, -1.0, 1.0, 1.0, -1.0)
 _LIMITS_RAD = np.deg2rad([170.0, 120.0, 170.0, 120.0, 170.0, 120.0])
+
+
+@dataclass(frozen=True)
+class Home(Case):
+    """How near a joint comes to its limit along the three paths.
+
+    The margin is that of the pseudo-inverse and of the network's steady state without any limit.
+    """
+
+    home: str
+    q_rad: tuple[float, ...]
+    source: str
+
+    def measured(self) -> Measured:
+        """The home, its margin, and where it comes from."""
+        _, margin = averages(np.array([self.q_rad[:6]]), STEPS)
+        joints = {f"q{i + 1}_rad": x for i, x in enumerate(self.q_rad)}
+        found: Row = {"margin_rad": float(margin[0]), "source": self.source}
+        return Measured(case=self, row={"home": self.home, **joints, **found})
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -40,9 +77,14 @@ class Candidate:
     margin_rad: float
 
 
-def search(home: int, seed: int, count: int = 200_000) -> list[Candidate]:
-    """The best homes of a random search with refinement, best first; every path inside the joint limits."""
-    target = table_4_averages(home)
+def search(target: Array, seed: int, count: int = 200_000) -> list[Candidate]:
+    """The best homes of a random search with refinement, best first; every path inside the joint limits.
+
+    Args:
+        target: The averages (6,) of mu that a home must have, in the order of `averages`.
+        seed: Of the search.
+        count: Number of random homes.
+    """
     q = _screen(target, np.random.default_rng(seed), count, keep=60)
     for steps, rounds, keep in ((120, 12, 12), (400, 6, 4), (1000, 3, 4)):
         q = refine(q, target, steps, rounds)[:keep]
@@ -59,19 +101,14 @@ def search(home: int, seed: int, count: int = 200_000) -> list[Candidate]:
     ]
 
 
-def table_4_averages(home: int) -> Array:
-    """Table 4's averages (6,): not optimised on circle, sinusoid and spiral, then optimised."""
-    tables = (paper.TABLE_4_NOT_OPTIMISED, paper.TABLE_4_OPTIMISED)
-    return np.array([table[path][home - 1] for table in tables for path in paper.PATHS])
-
-
 def averages(q: Array, steps: int) -> tuple[Array, Array]:
     """Averages of mu of many homes (n, 6) [rad], without joint limits.
 
     The optimised ones are those of the network's steady state, q' = J+ v + (c3/c2) N grad(ln mu).
 
     Returns:
-        Averages (n, 6), in the order of `table_4_averages`; smallest distance from a joint limit (n,) [rad].
+        Averages (n, 6), not optimised on circle, sinusoid and spiral, then optimised; smallest distance from
+        a joint limit (n,) [rad].
     """
     found, margin = np.empty((len(q), 6)), np.full(len(q), np.inf)
     for column, path in enumerate(_paths(steps)):

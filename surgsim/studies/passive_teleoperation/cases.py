@@ -1,18 +1,44 @@
-"""The experiment as data: the paper's scenarios as shipped, and one push that is varied."""
+"""The passive teleoperation paper's numbers, its shipped scenarios, one push that is varied, and timing."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
-from typing import Literal
+from time import thread_time
+from typing import ClassVar, Literal
 
+import numpy as np
+
+from surgsim.columns import scalar
+from surgsim.control.resolvers.base import KernelResolver
+from surgsim.control.resolvers.passive_qp import PassiveQpConfig
+from surgsim.models.arm import ArmModel
 from surgsim.scenario.load import load_scenario
 from surgsim.scenario.schema import Scenario
-from surgsim.studies.figure import BLUE, GREEN, VERMILLION
+from surgsim.studies.passive_teleoperation.measures import (
+    curves_over_time,
+    push_measures,
+    shipped_measures,
+)
+from surgsim.studies.study import Curves, Paper, Printed, SimulatedCase
+from surgsim.studies.tables import Cell, Row
 from surgsim.teleop.messages import PassivityMode
+from surgsim.tick.arrays import Array, Resolved, Seen
+from surgsim.trace.trace import Trace
 
 Place = Literal["wall", "free"]
 Grip = Literal["normal", "light"]
 Link = Literal["clean", "lossy"]
+
+PAPER = Paper(
+    title="A Passive Convex Optimal Control Algorithm for Teleoperating a Redundant Robotic Arm in Minimally "
+    "Invasive Surgery",
+    reference="doi 10.1002/rnc.7613",
+    printed={
+        "rcm_rms": Printed("section 3.1", "mm", 0.3),
+        "velocity_rms": Printed("section 3.1", "mm/s", 4.7),
+        "round_trip": Printed("section 3", "ms", 300),
+    },
+)
 
 SHIPPED: dict[str, str] = {
     "free motion": "teleop_free_motion_panda",
@@ -23,20 +49,15 @@ SHIPPED: dict[str, str] = {
 """The paper's experiment and what it claims, by name."""
 
 PASSIVITY: tuple[PassivityMode, ...] = ("tank", "tdpa", "off")
-COLOURS = {"tank": BLUE, "tdpa": GREEN, "off": VERMILLION}
 GRIPS: tuple[Grip, ...] = ("normal", "light")
 DELAYS_MS = (0, 100, 200, 300, 500, 700, 1000)
 LOSSY_DELAYS_MS: dict[Grip, tuple[int, ...]] = {"normal": (0, 300, 1000), "light": DELAYS_MS}
 LOSSY_SEEDS = (0, 1, 2)
 """Seeds over the lossy channel in a light grip at the paper's delay; the other cells have the first."""
 
-PAPER_DELAY_MS = 300
-
 PUSH_S: dict[Grip, float] = {"normal": 6.0, "light": 10.0}
 """A push lasts this and `ROUND_TRIPS`: long enough for a tank to be spent in a light grip [s]."""
-ROUND_TRIPS, WINDOW_S = 4.0, 2.0
-"""The last two windows, in which the intention rests, are compared."""
-
+ROUND_TRIPS = 4.0
 
 _ASIDE = "{position_m: [0.02, 0.65, -0.045], push: true, dwell_s: 0.1}"
 _DOWN = "{position_m: [0.0, 0.65, -0.075], push: true, dwell_s: 1000.0}"
@@ -49,7 +70,7 @@ _LINK: dict[Link, str] = {"clean": "jitter_s: 0.0, loss: 0.0", "lossy": "jitter_
 
 
 @dataclass(frozen=True, kw_only=True)
-class Push:
+class Push(SimulatedCase):
     """The operator moves aside, then to 15 mm below the wall's surface, and stays: once, without looking.
 
     Attributes:
@@ -77,6 +98,11 @@ class Push:
         return f"{self.place}, {self.grip} grip, {self.passivity}, {self.delay_ms} ms{link}"
 
     @property
+    def compared(self) -> bool:
+        """Whether it is one of those through the paper's delay that are compared and shown."""
+        return self.delay_ms == PAPER["round_trip"] and self.link == "clean"
+
+    @property
     def duration_s(self) -> float:
         """Length of the run [s]."""
         return self.cut_s or round(PUSH_S[self.grip] + ROUND_TRIPS * self.delay_ms / 1000.0, 3)
@@ -99,9 +125,19 @@ class Push:
             ],
         )
 
+    def measures(self, trace: Trace) -> Row:
+        """What it is, energy, how it ends, tracking and force feel."""
+        names = ("place", "grip", "link", "seed", "delay_ms", "passivity")
+        found = push_measures(trace, self.duration_s, tanks=self.passivity == "tank")
+        return {**{name: getattr(self, name) for name in names}, **found}
 
-@dataclass(frozen=True, kw_only=True)
-class Shipped:
+    def curves(self, trace: Trace) -> Curves:
+        """Of those that are compared."""
+        return curves_over_time(trace) if self.compared else {}
+
+
+@dataclass(frozen=True)
+class Shipped(SimulatedCase):
     """A shipped scenario.
 
     Attributes:
@@ -121,11 +157,69 @@ class Shipped:
         """The scenario; nothing but its theatre, which has no part in it, is left out."""
         return load_scenario(SHIPPED[self.name], assignments=["theatre=false", *self.keys])
 
+    def measures(self, trace: Trace) -> Row:
+        """Accuracy, tanks, slack, constraints."""
+        return {"scenario": self.name, **shipped_measures(trace)}
 
-Case = Push | Shipped
+    def curves(self, trace: Trace) -> Curves:
+        """Everything over time."""
+        return curves_over_time(trace)
 
 
-def comparison(place: Place, delays_ms: Sequence[int] = (PAPER_DELAY_MS,)) -> list[Push]:
+class TimedQpConfig(PassiveQpConfig):
+    """`passive_qp` whose trace has the time of each step as `qp_time_s`."""
+
+    def build(self, arm: ArmModel) -> KernelResolver:
+        """The resolver, its kernel called from Python."""
+        inner = super().build(arm)
+        last = sum(len(block.columns) for block in inner.columns)
+
+        def kernel(gains: Array, seen: Seen, memory: Array, out: Resolved) -> int:
+            began = thread_time()
+            status = inner.kernel(gains, seen, memory, out)
+            out.values[last] = thread_time() - began
+            return status
+
+        return replace(inner, kernel=kernel, columns=(*inner.columns, scalar("qp_time", "s")))
+
+
+@dataclass(frozen=True)
+class Timed(SimulatedCase):
+    """How long a tick of a shipped scenario takes, in the time of its thread: differs between machines.
+
+    Attributes:
+        shipped: The scenario.
+        warm_ticks: Ticks that do not count.
+    """
+
+    alone: ClassVar[bool] = True
+    shipped: Shipped
+    warm_ticks: int = 100
+
+    @property
+    def label(self) -> str:
+        """In words."""
+        return f"timing, {self.shipped.name}"
+
+    def scenario(self) -> Scenario:
+        """The scenario with its QP timed."""
+        scenario = self.shipped.scenario()
+        controller = scenario.controller
+        resolver = TimedQpConfig(**controller.resolver.model_dump())
+        return scenario.model_copy(
+            update={"controller": controller.model_copy(update={"resolver": resolver})}
+        )
+
+    def measures(self, trace: Trace) -> Row:
+        """Median and 99th percentile of a tick's time [us]."""
+        found: dict[str, Cell] = {"scenario": self.shipped.name, "ticks": len(trace) - self.warm_ticks}
+        for name, column in (("qp", "qp_time_s"), ("controller", "control_time_s")):
+            time_us = 1e6 * trace[column][self.warm_ticks :]
+            found |= {f"{name}_p{at}_us": float(np.percentile(time_us, at)) for at in (50, 99)}
+        return found
+
+
+def comparison(place: Place, delays_ms: tuple[int, ...] = (PAPER["round_trip"],)) -> list[Push]:
     """Every way of keeping passive, in both grips, over a clean channel."""
     return [
         Push(place=place, passivity=passivity, grip=grip, delay_ms=delay)
@@ -139,6 +233,38 @@ def sweep() -> list[Push]:
         Push(place="wall", passivity=passivity, grip=grip, delay_ms=delay, link="lossy", seed=seed)
         for grip in GRIPS
         for delay, passivity in product(LOSSY_DELAYS_MS[grip], PASSIVITY)
-        for seed in (LOSSY_SEEDS if (grip, delay) == ("light", PAPER_DELAY_MS) else LOSSY_SEEDS[:1])
+        for seed in (LOSSY_SEEDS if (grip, delay) == ("light", PAPER["round_trip"]) else LOSSY_SEEDS[:1])
     ]
     return [*comparison("wall", DELAYS_MS), *lossy]
+
+
+_LINES: tuple[tuple[str, str, Cell], ...] = (
+    ("RCM error, RMS (mm)", "rcm_rms_mm", PAPER["rcm_rms"]),
+    ("RCM error, largest (mm)", "rcm_max_mm", None),
+    ("velocity error, aligned (mm/s)", "velocity_aligned_mm_per_s", PAPER["velocity_rms"]),
+    ("velocity error, not aligned (mm/s)", "velocity_unaligned_mm_per_s", PAPER["velocity_rms"]),
+    ("velocity error, all ticks (mm/s)", "velocity_all_ticks_mm_per_s", PAPER["velocity_rms"]),
+    ("lowest tank (J)", "tank_min_j", None),
+    ("largest slack (mm/s)", "slack_max_mm_per_s", None),
+    ("largest slack, nothing active (mm/s)", "slack_free_max_mm_per_s", None),
+    ("a plane acts (% of ticks)", "planes_percent", None),
+    ("times that a plane began to act", "plane_contacts", None),
+    ("tip past a plane (mm)", "plane_overshoot_mm", None),
+    ("command above the speed limit (% of ticks)", "speed_limit_percent", None),
+    ("speed limit of an axis (mm/s)", "tip_speed_limit_mm_per_s", None),
+    ("fastest tip along an axis (mm/s)", "tip_speed_max_mm_per_s", None),
+    ("the energy budget acts (% of ticks)", "passivity_percent", None),
+    ("the operator's tank limits the force (% of ticks)", "force_scaled_percent", None),
+    ("rings transferred", "rings_transferred", None),
+    ("rings dropped", "ring_drops", None),
+    ("unexplained energy (% of exchanged)", "energy_residual_percent", None),
+    ("duration (s)", "duration_s", None),
+)
+
+
+def beside_the_paper(scenarios: Sequence[Row]) -> list[Row]:
+    """One line for each figure: the paper's, then ours in every scenario."""
+    return [
+        {"figure": words, "paper": paper, **{str(row["scenario"]): row[column] for row in scenarios}}
+        for words, column, paper in _LINES
+    ]

@@ -1,4 +1,7 @@
-"""Rows of the tables: what a trace says."""
+"""What is measured of a trace: accuracy, energy, constraints, and how a push that is only held ends."""
+
+from collections.abc import Sequence
+from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -6,19 +9,64 @@ from numpy.typing import NDArray
 from surgsim.metrics.accuracy import rms
 from surgsim.metrics.catalog import compute_metrics
 from surgsim.metrics.teleoperation import tip_velocity
-from surgsim.studies.passive_teleoperation.cases import WINDOW_S, Push, Shipped
-from surgsim.studies.passive_teleoperation.stability import steadiness
-from surgsim.studies.study import Cell, Row
+from surgsim.studies.measures import outcome
+from surgsim.studies.study import Array, Curves
+from surgsim.studies.tables import Row, groups, number, pick
 from surgsim.trace.trace import Trace
 
-Array = NDArray[np.float64]
+Steadiness = Literal["rests", "decays", "chatters", "oscillates", "grows", "runs away", "stopped"]
+
+REST_MM_PER_S = 5.0
+"""RMS speed of a handle at rest; tremor alone moves it by about 1 mm/s."""
+STEADY_N, STEADY_SHARE = 0.5, 0.05
+"""Standard deviation of a steady contact force: at most this, or this share of its mean."""
+GROWTH, DECAY = 1.05, 0.8
+"""Ratio of the handle's RMS speeds in the last two windows above which it grows, below which it decays."""
+FAST_MM_PER_S = 150.0
+"""RMS speed as high as the operator ever means to move, while it means to rest."""
+
+UNSTABLE: tuple[Steadiness, ...] = ("oscillates", "grows", "runs away", "stopped")
+
+
+def steadiness(
+    outcome: str, speed_before: float, speed_end: float, force_mean: float, force_deviation: float
+) -> Steadiness:
+    """How a push ends, from its last two windows.
+
+        stopped      the run did not complete: a safety limit was passed
+        rests        handle below 5 mm/s RMS, contact force steady
+        chatters     handle at rest, contact force not
+        runs away    the handle moves at 150 mm/s RMS or more
+        decays       the handle still moves, with at most 0.8 times the speed of the window before
+        grows        at least 1.05 times that speed
+        oscillates   neither: it neither dies away nor grows
+
+    Args:
+        outcome: How the run ended.
+        speed_before: RMS speed of the handle in the window before the last [mm/s].
+        speed_end: The same in the last window [mm/s].
+        force_mean: Mean contact force in the last window [N].
+        force_deviation: Its standard deviation [N].
+    """
+    if outcome != "completed":
+        return "stopped"
+    if speed_end <= REST_MM_PER_S:
+        steady = force_deviation <= max(STEADY_N, STEADY_SHARE * force_mean)
+        return "rests" if steady else "chatters"
+    if speed_end >= FAST_MM_PER_S:
+        return "runs away"
+    ratio = speed_end / max(speed_before, 1e-9)
+    if ratio >= GROWTH:
+        return "grows"
+    return "decays" if ratio <= DECAY else "oscillates"
+
+
 AT_LIMIT = 1e-6
 """How near to its speed limit a tip counts as limited [m/s]."""
-
-
-def outcome(trace: Trace) -> str:
-    """How the run ended."""
-    return trace.meta.ending.outcome.name.lower()
+WINDOW_S = 2.0
+"""The last two windows, in which the intention of a push rests, are compared."""
+EVERY = 10
+"""Rows of the trace for each that is kept of a curve."""
 
 
 def magnitude(trace: Trace, block: str) -> Array:
@@ -42,12 +90,13 @@ def _switches(on: Array) -> int:
     return int(np.sum(np.diff((on > 0.0).astype(int)) == 1))
 
 
-def _velocity_errors(trace: Trace) -> dict[str, Cell]:
+def _velocity_error(trace: Trace) -> float:
+    """RMS of the tip's velocity against the command that has arrived, over all ticks [mm/s]."""
     error = tip_velocity(trace) - trace.block("velocity_command")
-    return {"velocity_all_ticks_mm_per_s": 1e3 * rms(np.linalg.norm(error, axis=1))}
+    return 1e3 * rms(np.linalg.norm(error, axis=1))
 
 
-def shipped_row(case: Shipped, trace: Trace) -> Row:
+def shipped_measures(trace: Trace) -> Row:
     """A shipped scenario: accuracy, tanks, slack, constraints."""
     trace = trace.active()
     found = compute_metrics(trace)
@@ -55,14 +104,13 @@ def shipped_row(case: Shipped, trace: Trace) -> Row:
     slack = magnitude(trace, "slack")
     fastest = float(np.max(np.abs(tip_velocity(trace))))
     return {
-        "scenario": case.name,
         "outcome": outcome(trace),
         "duration_s": float(trace["t_s"][-1]),
         "rcm_rms_mm": found["rcm_error_rms_mm"],
         "rcm_max_mm": found["rcm_error_max_mm"],
         "velocity_aligned_mm_per_s": found["velocity_error_rms_mm_per_s"],
         "velocity_unaligned_mm_per_s": found["velocity_error_unaligned_rms_mm_per_s"],
-        **_velocity_errors(trace),
+        "velocity_all_ticks_mm_per_s": _velocity_error(trace),
         "tank_min_j": found["tank_min_j"],
         "deficit_j": float(trace["tank_operator_deficit_j"][-1] + trace["tank_remote_deficit_j"][-1]),
         "passivity_percent": 100.0 * float(np.mean(trace["passivity_active"])),
@@ -96,26 +144,23 @@ def _free_slack(trace: Trace, slack: Array, limited: NDArray[np.bool_]) -> float
     return 1e3 * float(np.max(slack[free])) if free.any() else None
 
 
-def push_row(case: Push, trace: Trace) -> Row:
-    """A push: energy, how it ends, tracking and force feel; a stopped one until its stop."""
+def push_measures(trace: Trace, end_s: float, *, tanks: bool) -> Row:
+    """A push that ends at `end_s` [s]: energy, how it ends, tracking and force feel.
+
+    One that is stopped is measured until its stop.
+    """
     trace = trace.active()
     speed = 1e3 * magnitude(trace, "handle_velocity")
     force, felt = magnitude(trace, "tip_force"), magnitude(trace, "master_force")
-    t, end_s = trace["t_s"], case.duration_s
+    t = trace["t_s"]
     last = t >= min(end_s, float(t[-1])) - WINDOW_S
     before = (t >= end_s - 2.0 * WINDOW_S) & (t < end_s - WINDOW_S)
     mean, deviation = float(np.mean(force[last])), float(np.std(force[last]))
     before_speed = rms(speed[before]) if before.any() else 0.0
-    stock = _stock(trace) if case.passivity == "tank" else 0.0
+    stock = _stock(trace) if tanks else 0.0
     delivered = float(np.max(trace["delivered_j"]))
     touched = mean > 0.1
     return {
-        "place": case.place,
-        "grip": case.grip,
-        "link": case.link,
-        "seed": case.seed,
-        "delay_ms": case.delay_ms,
-        "passivity": case.passivity,
         "outcome": outcome(trace),
         "end": steadiness(outcome(trace), before_speed, rms(speed[last]), mean, deviation),
         "handle_speed_before_mm_per_s": before_speed,
@@ -126,13 +171,13 @@ def push_row(case: Push, trace: Trace) -> Row:
         "contact_max_n": float(np.max(force)),
         "master_force_n": float(np.mean(felt[last])),
         "force_ratio": float(np.mean(felt[last])) / mean if touched else None,
-        "drift_end_mm": 1e3 * float(np.mean(trace.active()["tip_error_m"][-100:])),
-        "velocity_aligned_mm_per_s": _velocity_errors(trace.active())["velocity_all_ticks_mm_per_s"],
+        "drift_end_mm": 1e3 * float(np.mean(trace["tip_error_m"][-100:])),
+        "velocity_aligned_mm_per_s": _velocity_error(trace),
         "delivered_max_j": delivered,
         "beyond_stock_j": delivered - stock,
-        "tank_min_j": _tank_min(trace) if case.passivity == "tank" else None,
+        "tank_min_j": _tank_min(trace) if tanks else None,
         "passivity_percent": 100.0 * float(np.nanmean(trace["passivity_active"])),
-        "force_scaled_percent": _force_scaled(trace) if case.passivity == "tank" else None,
+        "force_scaled_percent": _force_scaled(trace) if tanks else None,
         "rcm_rms_mm": 1e3 * rms(trace["rcm_error_m"]),
         "rcm_max_mm": 1e3 * float(np.max(trace["rcm_error_m"])),
     }
@@ -145,3 +190,55 @@ def _stock(trace: Trace) -> float:
 
 def _tank_min(trace: Trace) -> float:
     return float(np.nanmin((trace["tank_operator_j"], trace["tank_remote_j"])))
+
+
+def curves_over_time(trace: Trace) -> Curves:
+    """Curves over time, SI units, 100 rows a second; flags and slack are the largest of each ten rows."""
+    return {
+        "t": _thin(trace["t_s"]),
+        "tank_operator": _thin(trace["tank_operator_j"]),
+        "tank_remote": _thin(trace["tank_remote_j"]),
+        "slack": _largest(magnitude(trace, "slack")),
+        "planes": _largest(trace["planes_active"]),
+        "budget": _largest(trace["passivity_active"]),
+        "scaled": _largest((trace["force_scale"] < 1.0).astype(float)),
+        "speed": _largest(speed_limited(trace).astype(float)),
+        "rcm": _largest(trace["rcm_error_m"]),
+        "force": _thin(magnitude(trace, "tip_force")),
+        "felt": _thin(magnitude(trace, "master_force")),
+        "handle_speed": _thin(magnitude(trace, "handle_velocity")),
+        "delivered": _thin(trace["delivered_j"]),
+        "v_tip": _thin(tip_velocity(trace)[:, 0]),
+        "v_command": _thin(trace.block("velocity_command")[:, 0]),
+        "v_issued": _thin(trace.block("velocity_issued")[:, 0]),
+    }
+
+
+def _thin(values: Array) -> Array:
+    return values[::EVERY].copy()
+
+
+def _largest(values: Array) -> Array:
+    """Largest of the rows that each kept row stands for."""
+    filled = np.nan_to_num(values, nan=0.0)
+    return np.maximum.reduceat(filled, np.arange(0, len(filled), EVERY))
+
+
+def frontier_table(pushes: Sequence[Row]) -> list[Row]:
+    """How each push ends, the worst over its seeds, and the smallest delay at which it is unstable."""
+    keys = ("place", "grip", "link", "passivity")
+    table: list[Row] = []
+    delays = sorted({round(number(row, "delay_ms")) for row in pushes})
+    for key, rows in groups(pushes, *keys).items():
+        ends = {delay: worst(pick(rows, delay_ms=delay)) for delay in delays}
+        unstable = [delay for delay, end in ends.items() if end in UNSTABLE]
+        shown = {f"{delay}_ms": end for delay, end in ends.items()}
+        named = dict(zip(keys, key, strict=True))
+        table.append({**named, **shown, "unstable_from_ms": min(unstable, default=None)})
+    return table
+
+
+def worst(rows: Sequence[Row]) -> str | None:
+    """The worst of the rows' ends; None without rows."""
+    names: list[str] = [name for name in get_args(Steadiness) if name in {row["end"] for row in rows}]
+    return names[-1] if names else None

@@ -15,7 +15,7 @@ from surgsim.control.failure import ControlFailure
 from surgsim.control.manipulability import jacobian_gradient
 from surgsim.control.rcm import rcm_cross_form
 from surgsim.control.resolvers.vprnn import VprnnConfig
-from surgsim.studies.vprnn.equations import Network, decayed
+from surgsim.control.resolvers.vprnn_system import Network, decayed
 
 LATE = 10.0  # beta exp(10) of a period of 1 ms: nothing is left of delta
 TABLE_1 = {"h0": 0.1, "h1": 10.0, "h2": 50.0, "h3": 30.0, "h4": 30.0, "k1": 5.0, "k2": 5.0, "beta": 1e3}

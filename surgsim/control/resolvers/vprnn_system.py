@@ -1,4 +1,4 @@
-"""The VPRNN's matrices of one instant, from the kernels of the resolver itself."""
+"""The VPRNN's linear system of one instant, eq. (25), from the kernels of the resolver: to study it alone."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,7 +24,7 @@ Array = NDArray[np.float64]
 
 
 class Network:
-    """W z = l of eq. (25) for a problem that stands still.
+    """W z = l of eq. (25) for a problem that stands still, from the kernels of the resolver itself.
 
     Args:
         config: Gains.
@@ -69,6 +69,6 @@ class Network:
 def decayed(gains: Array, delta: Array, t_s: float, dt_s: float) -> Array:
     """The error delta after one period from `t_s` [s], with a VPRNN's `gains`."""
     out = np.array(delta, dtype=float)
-    progress = gains[BETA] * exponential_integral(float(t_s), float(t_s + dt_s), gains[CAP])
-    decay(out, progress, gains[BOUND])
+    integral = exponential_integral(float(t_s), float(t_s + dt_s), gains[CAP])
+    decay(out, gains[BETA] * integral, gains[BOUND])
     return out

@@ -1,0 +1,284 @@
+"""The page of the VPRNN study: its figures, and what is written between them."""
+
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from surgsim.studies.figure import (
+    BLACK,
+    BLUE,
+    GREEN,
+    ORANGE,
+    PURPLE,
+    VERMILLION,
+    Axes,
+    formula,
+    heat_map,
+    label,
+)
+from surgsim.studies.study import Array, Figure, Measured, Results, Section
+from surgsim.studies.tables import Row, Tables, number, numbers, pick
+from surgsim.studies.vprnn.cases import (
+    FRICTIONS_NM,
+    LABEL,
+    LEVELS,
+    METHODS,
+    PAPER,
+    PAPER_SIZE,
+    PAYLOADS_KG,
+    SHOWN,
+    STARTED,
+    WATCHED_S,
+    Sinusoid,
+)
+from surgsim.studies.vprnn.networks import cross_form_rank, draw_euler, draw_networks, instant
+
+_TIME = "time (s)"
+_TIP_MM, _RCM_MM = PAPER["tip_bound"], PAPER["rcm_bound"]
+_PAYLOAD, _FRICTION = "payload at the adapter (kg)", "Coulomb friction of each joint (N m)"
+_ERRORS = (
+    ("tip_max_mm", _TIP_MM, "largest tip error (mm)"),
+    ("rcm_max_mm", _RCM_MM, "largest RCM error (mm)"),
+)
+
+
+def _style(name: str) -> dict[str, Any]:
+    method = METHODS[name]
+    return {"color": method.colour, "linestyle": method.style, "linewidth": 1.6, "label": method.label}
+
+
+def _over_time(axes: Axes, results: Results, values: Callable[[Measured], Array]) -> None:
+    """Every controller over time, a panel for each level."""
+    for ax, level in zip(axes.flat, LEVELS, strict=True):
+        for name in METHODS:
+            found = results.of(Sinusoid(name, level))
+            ax.plot(found.curves["t_s"], values(found), **_style(name))
+
+
+def _tracking(axes: Axes, results: Results, _: Tables) -> None:
+    for row, level in zip(axes, LEVELS, strict=True):
+        start = results.of(Sinusoid("vprnn", level)).curves["tip_ref"][0]
+        for ax, i, axis in ((row[0], 1, "y"), (row[1], 2, "z")):
+            wanted = 1e3 * (results.of(Sinusoid("vprnn", level)).curves["tip_ref"] - start)
+            ax.plot(*wanted[:, [0, i]].T, color="0.75", linewidth=5.0, label="desired")
+            for name in METHODS:
+                tip = 1e3 * (results.of(Sinusoid(name, level)).curves["tip"] - start)
+                ax.plot(*tip[:, [0, i]].T, **_style(name))
+            ax.set(title=str(level), ylabel=f"{axis} from the start (mm)")
+        row[1].set_ylim(-4.0, 1.0)
+    label(axes, "x from the start (mm)", legend=6)
+
+
+def _error(name: str, bound: float, axes: Axes, results: Results, _: Tables) -> None:
+    _over_time(axes, results, lambda found: 1e3 * found.curves[f"{name}_error_m"])
+    for ax in axes.flat:
+        ax.axhline(bound, color="0.3", linewidth=1.2, linestyle=(0, (1, 1)))
+        ax.text(0.2, 1.12 * bound, f"the paper's bound, {bound:g} mm", color="0.3", fontsize=9.5)
+        ax.set(yscale="log", ylim=(1e-5, 60.0))
+    label(axes, _TIME, [f"{'RCM' if name == 'rcm' else name} error (mm)"], LEVELS, legend=5)
+
+
+def _manipulability(axes: Axes, results: Results, _: Tables) -> None:
+    for ax, level in zip(axes.flat, LEVELS, strict=True):
+        best = results.of(Sinusoid("self_motion", level)).curves
+        style = {"color": BLACK, "linewidth": 4.0, "alpha": 0.25, "label": "attainable µ*"}
+        ax.plot(best["attainable_t_s"], best["attainable"], **style)
+    _over_time(axes, results, lambda found: found.curves["manipulability"])
+    label(axes, _TIME, ["manipulability µ (m³)"], LEVELS, legend=6)
+
+
+def _joints(axes: Axes, results: Results, _: Tables) -> None:
+    colours = (BLACK, ORANGE, "#56B4E9", GREEN, VERMILLION, BLUE, PURPLE)
+    styles = ("-", "--", "-.", ":", "-", "--", "-.")
+    for ax, level in zip(axes.flat, LEVELS, strict=True):
+        curves = results.of(Sinusoid("vprnn", level)).curves
+        for i, q in enumerate(np.rad2deg(curves["q"]).T):
+            ax.plot(curves["t_s"], q, styles[i], color=colours[i], linewidth=1.8, label=f"q{i + 1}")
+    label(axes, _TIME, ["joint angle (deg)"], LEVELS, legend=7)
+
+
+def _gains(axes: Axes, _: Results, tables: Tables) -> None:
+    shapes = {"Nullspace": ("o", VERMILLION, 12), "RNN": ("s", BLUE, 8), "VPRNN": ("^", PURPLE, 8)}
+    rows = [
+        r for r in tables["gains"] if r["climbing_rate"] is not None and "without" not in str(r["variant"])
+    ]
+    for name, (marker, colour, size) in shapes.items():
+        mine = [row for row in rows if str(row["variant"]).split(",")[0] == name]
+        style = {"color": colour, "markersize": size, "fillstyle": "none", "markeredgewidth": 2.0}
+        for ax, column in zip(axes.flat, ("mu_mean", "mu_mean_kinematic"), strict=True):
+            rates = numbers(mine, "climbing_rate")
+            ax.plot(rates, numbers(mine, column), marker, label=name, linestyle="none", **style)
+    for ax in axes.flat:
+        ax.set_xscale("symlog", linthresh=0.01)
+        ax.set_xlim(-0.002, 20.0)
+    words = ["under torques", "perfect velocity tracking"]
+    label(axes, "k (rad²/s); Table I: VPRNN 0.01, RNN 1", ["mean manipulability µ (m³)"], words)
+    axes[0, 0].legend(frameon=False, fontsize=10, loc="upper left")
+
+
+def _ladder(axes: Axes, _: Results, tables: Tables) -> None:
+    rows = tables["ladder"]
+    for ax, (column, bound, words) in zip(axes[0], _ERRORS, strict=True):
+        vprnn = pick(rows, controller=LABEL["vprnn"])
+        found = {(row["payload_kg"], row["friction_nm"]): number(row, column) for row in vprnn}
+        values = np.array([[found[m, f] for f in FRICTIONS_NM] for m in PAYLOADS_KG])
+        heat_map(ax, values, FRICTIONS_NM, PAYLOADS_KG, bound)
+        ax.set(title=f"VPRNN, {words}; boxed: within {bound:g} mm", xlabel=_FRICTION)
+    _alone(axes[1, 0], pick(rows, friction_nm=0.0), "payload_kg")
+    _alone(axes[1, 1], pick(rows, payload_kg=0.0), "friction_nm")
+    label(axes, [_PAYLOAD, _FRICTION], [_PAYLOAD, "largest error (mm)"])
+    label(axes[1:], titles=["payload alone", "friction alone"])
+    axes[1, 0].legend(frameon=False, fontsize=10, loc="upper left", ncols=2)
+
+
+def _alone(ax: Axes, rows: list[Row], axis: str) -> None:
+    for name, short in (("vprnn", "VPRNN"), ("rcm_inverse_dynamics", "ours")):
+        mine = pick(rows, controller=LABEL[name])
+        for (column, _, _), style, what in zip(_ERRORS, ("o-", "s--"), ("tip", "RCM"), strict=True):
+            label = f"{short}, {what}"
+            ax.semilogy(
+                numbers(mine, axis), numbers(mine, column), style, color=METHODS[name].colour, label=label
+            )
+    ax.set_ylim(1e-5, 3e3)
+
+
+def _starts(axes: Axes, results: Results, _: Tables) -> None:
+    t = np.linspace(0.0, WATCHED_S, 50)
+    for column, name in zip(axes.T, STARTED, strict=True):
+        near = [found.curves for found in results["starts"] if found.case.method == name and found.curves]
+        for ax, error, size in zip(column, ("tip_error_m", "rcm_error_m"), (20.0, 10.0), strict=True):
+            for curves in near:
+                style = {"color": METHODS[name].colour, "linewidth": 0.8, "alpha": 0.6}
+                ax.semilogy(curves["t_s"], 1e3 * curves[error], **style)
+            formula(ax, t, size * np.exp(-5.0 * t), "exp(-k t), k1 = k2 = 5 1/s")
+            ax.set_ylim(1e-4, 60.0)
+    label(axes, _TIME, ["tip error (mm)", "RCM error (mm)"], [LABEL[name] for name in STARTED])
+    axes[0, 0].legend(frameon=False, fontsize=9.5, loc="upper right")
+
+
+_NOT, _ALL, _Y, _WIDE = "Not in the paper:", (True, True), (False, True), ((1, 2), (11.5, 5.0))
+_F5, _F6 = r"Figure 5: end-effector error $E_\mathrm{end}$", r"Figure 6: RCM error $\|E_\mathrm{rcm}\|$"
+_F7 = "Figure 7: manipulability µ, and the largest that self-motion could reach"
+_CLIMB = f"{_NOT} mean µ over the climbing rate k of q' = pinv(J) v + k N grad(ln µ)"
+_STILL = f"{_NOT} the networks alone, from random states, on a problem that stands still"
+_BREAKS = f"{_NOT} explicit Euler of eq. (29) breaks at t = ln(2/(Tβ)) (dashed)"
+_RANDOM = f"{_NOT} {SHOWN} random initial configurations under torques, the path's start held"
+_ROWS = (2, len(STARTED))
+FIGURES = (
+    Figure("figure_04.png", "Figure 4: trajectory tracking", _tracking, (2, 2), (12.5, 7.0), (True, False)),
+    Figure("figure_05.png", f"{_F5} (logarithmic)", partial(_error, "tip", _TIP_MM), *_WIDE, _ALL),
+    Figure("figure_06.png", f"{_F6} (logarithmic)", partial(_error, "rcm", _RCM_MM), *_WIDE, _ALL),
+    Figure("figure_07.png", _F7, _manipulability, *_WIDE, _ALL),
+    Figure("figure_08.png", "Figure 8: joint angles with VPRNN", _joints, *_WIDE, _Y),
+    Figure("gains.png", _CLIMB, _gains, (1, 2), (11.0, 4.6), _Y),
+    Figure("ladder.png", f"{_NOT} errors that payload and friction make", _ladder, (2, 2), (11.5, 8.4)),
+    Figure("networks.png", _STILL, draw_networks, (1, 2), (11.0, 4.6), _Y),
+    Figure("euler.png", _BREAKS, draw_euler, (1, 2), (11.0, 4.4), _Y),
+    Figure("starts.png", _RANDOM, _starts, _ROWS, (11.5, 6.0), (True, "row")),
+)
+
+INTRODUCTION = """\
+"{title}": Nullspace, RNN and VPRNN with the gains of Table I on an LWR4+ under torques, along the shipped
+scenario `sinusoid_lwr4plus`. Two controllers of surgsim run beside them. Everything here is made again by
+
+    {command}
+
+with {versions}. The CSV files hold every table with nine digits; only `starts_every_run.csv` is
+not shown."""
+_COMPARISON = f"""## Figures 4 to 8: the comparison
+
+Nominal means that the controller's model of the arm is exact. The paper's arm was a real one, with friction
+and payload that its model did not have, so the second level adds both: {PAPER_SIZE}, a cell at the
+edge of those of the ladder below that stay within 5 mm and 15 mm, where VPRNN's errors are of the size of
+the paper's figures. `mu over attainable` is the mean of µ/µ*, with µ* the largest µ that self-motion could
+reach with the same tip and the shaft through the same point, where it passes the trocar, so that a run
+cannot pass it."""
+_GAINS = """## Gains: why the three are nearly alike
+
+With v the right side of eq. (20) and J = [J_T; J_rcm], the constrained optimum of eq. (22) is
+
+    q' = pinv(J) v + (h0/h1) N grad(ln µ),  N = I - pinv(J) J
+
+since the terms of h2, h3 and h4 vanish where the constraints hold, and (J_T <> h) psi is grad(ln µ). The
+steady state of Jin's network is the same with c3/c2, and Nullspace is the same with its gain. So the three
+differ by one number, the climbing rate: 0.01 for VPRNN and 1 for RNN with Table I. VPRNN climbs a hundred
+times slower than RNN, and at equal rates they coincide
+(at 10, Nullspace's gradient is cut at the joints' velocity limits). VPRNN's tip and RCM errors, nominally
+1 % below the other two's by RMS, are those of not climbing at all (gain 0).
+
+Under torques, the resolver's velocity enters the law only through K_N2 and D_N2 in the null space of [tip;
+RCM]. Tip and RCM error are set by K_X, D_X, K_N and D_N: with K_N2 = D_N2 = 0, which cuts the resolver off,
+they stay as they are. RNN without RCM rows is the network of Jin et al. as Table I lists it, which has
+neither h3 nor k2."""
+_LADDER = """## Payload and friction
+
+Largest errors with a payload at the tip adapter and Coulomb friction in every joint, neither known to the
+controller. The RCM error passes its bound first, with either: its spring, K_N = 800 N/m, is the softest of
+the hierarchy. Friction of 1 N m in every joint is enough."""
+_NETWORKS = """## Convergence of the networks
+
+On the velocity problem of one instant, held still. VPRNN from a random z(0), so delta(0) = W z(0) - l; RNN
+from random omega, phi, lambda and sigma. `1 percent` is when q' stays within 1 % of its first distance from
+the optimum, at the control period's resolution; `end deviation` is relative to the formula above. RNN's
+slowest modes are those of its constants: the self-motion decays with c2/epsilon = 10 1/s."""
+_THEOREM = """## Theorem 1
+
+Eq. (27) stepped by 10 µs from delta(0) of a random z(0), against its closed form delta(0) exp(-beta (exp(t)
+- 1)), against Runge-Kutta, and V' = -beta exp(t) delta^T phi(delta) against the change of V (trapezoidal
+rule, so of the order of the step squared). The paper gives no bound for the activation of eq. (28); with
+one, the fall is linear until the bound is reached and depends on the start. With the paper's three
+cross-product rows of J_rcm, W has rank {rank} of {size}, so that z* is not unique, though q' is; the runs
+use two rows normal to the shaft."""
+_EULER = """## Explicit Euler of eq. (29)
+
+A step multiplies delta by 1 - T beta exp(t), which is below -1 from t = ln(2/(T beta)) on. `grows from` is
+the last step that did not enlarge delta, on the still problem from z = 0 shortly before; `above its start`
+is when rounding errors have grown past |delta(0)|."""
+_STARTS = """## Convergence of the arm from random configurations
+
+The path's start is held; the joints are displaced at random. Near: tip 5 to 20 mm and shaft 1 to 10 mm off.
+Far: tip 50 to 100 mm and shaft 10 to 50 mm off. `converged` counts runs whose tip and RCM error stay below
+1 mm before 3 s are over; runs that are stopped (a joint passed its velocity limit) are counted in `runs`
+only, medians are over those that converge. A `rate` is ln(20) over the time from which the error stays
+below 5 % of its start: 5 1/s for an exponential with k1 = k2 = 5 1/s. With perfect velocity tracking that
+is what every resolver has; under torques the impedance law sets it. No resolver is the fastest in every
+column: the three differ by less than the starts do."""
+_UNKNOWN = """## What the paper does not say
+
+Its curves are pictures without numbers, so that only its bounds of 5 mm and 15 mm can be compared."""
+_CHOSEN = (
+    ("gain of Nullspace", "1 rad²/s on grad(ln µ); 0 to 10 in the table of gains"),
+    ("λ = 0.5 in Table I's RNN", "not defined anywhere in the paper; not used"),
+    (
+        "RCM rows of RNN",
+        "Table I gives neither h3 nor k2: c0 of the tip rows, k2 = 5 1/s; without them in the table of gains",
+    ),
+    ("constants of RNN", "c3 = h0, c2 = h1, c0 = h2, c1 = h4, epsilon = 1/beta"),
+    ("bounds of eq. (28)", "linear activation; 1 in the table of Theorem 1"),
+    (
+        "sinusoid, trocar, home, instrument",
+        "`sinusoid_lwr4plus`; A = 1 cm and L = 25 cm are from another paper of the same group; 10 s",
+    ),
+    ("sampling time, integration", "1 ms; delta is stepped in closed form, exp(t) is held from t = 20 s on"),
+    ("friction and payload of the real arm", "the ladder"),
+)
+
+
+def _theorem(_: Tables) -> str:
+    rank, size = cross_form_rank(instant())
+    return _THEOREM.format(rank=rank, size=size)
+
+
+SECTIONS = (
+    Section(_COMPARISON, "comparison", tuple(f"figure_0{i}.png" for i in range(4, 9))),
+    Section(_GAINS, "gains", ("gains.png",)),
+    Section(_LADDER, "ladder", ("ladder.png",)),
+    Section(_NETWORKS, "network_rates", ("networks.png",)),
+    Section(_theorem, "theorem_1"),
+    Section(_EULER, "euler", ("euler.png",)),
+    Section("The whole sinusoid with Table I at 1 kHz:", "euler_arm"),
+    Section(_STARTS, "starts", ("starts.png",)),
+    Section(_UNKNOWN, rows=tuple({"what": what, "here": here} for what, here in _CHOSEN)),
+)
