@@ -10,9 +10,10 @@ import importlib
 import multiprocessing
 import re
 import sys
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Annotated, Any, ClassVar, Literal, Union, get_args
+from typing import Annotated, Any, ClassVar, Literal, Protocol, Union, get_args
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, create_model, model_validator
 
@@ -20,10 +21,36 @@ from surgsim.errors import SurgsimError, told, unknown_name
 from surgsim.plugins import Offer, offers
 
 
+class Surroundings(Protocol):
+    """What a part may ask of the scenario that names it."""
+
+    @property
+    def control_period_s(self) -> float:
+        """Time between control ticks [s]."""
+        ...
+
+    @property
+    def has_wall(self) -> bool:
+        """Whether there is a physical wall around the trocar."""
+        ...
+
+    @property
+    def props(self) -> Sequence[object]:
+        """Configs of the props."""
+        ...
+
+
 class PartConfig(BaseModel):
     """Base of every config: frozen, strict, unknown keys refused."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
+
+    def check(self, scenario: Surroundings) -> None:
+        """Refuse a scenario that the part does not fit.
+
+        Raises:
+            ValueError: With the reason.
+        """
 
 
 def _check_name(name: str) -> str:

@@ -12,6 +12,7 @@ from surgsim.contract.problems import DT, random_q
 from surgsim.models.build import Scene, build
 from surgsim.models.config import SceneConfig
 from surgsim.plant import PLANTS
+from surgsim.plant.base import Plant
 
 Array = NDArray[np.float64]
 
@@ -78,6 +79,14 @@ def leaves_the_joints(config: Any, scene: SceneConfig) -> None:
 
 
 @on_every_arm
+def has_what_is_used(config: Any, scene: SceneConfig) -> None:
+    """The plant has all that the loop and what stands around it use, see `surgsim.plant.base.Plant`."""
+    plant = config().build(build(scene), DT, (), np.random.SeedSequence(0))
+    missing = [name for name in vars(Plant) if not name.startswith("_") and not hasattr(plant, name)]
+    require(not missing, f"the plant has no {', '.join(missing)}")
+
+
+@on_every_arm
 def plant_starts_afresh(config: Any, scene: SceneConfig) -> None:
     """States begin at zero time where the arm was put, move, repeat themselves, and are the reader's own."""
     q = random_q(arm_of(scene), np.random.default_rng(1))
@@ -103,4 +112,7 @@ _STEADY = Check(name="is deterministic under a seed and starts afresh", run=dete
 _KNOWN = "leaves the arm as the controller knows it"
 DISTURBANCE_CHECKS = (_STEADY, Check(name=_KNOWN, run=leaves_the_joints))
 PROP_CHECKS = (_STEADY, Check(name=_KNOWN, run=leaves_the_arm))
-PLANT_CHECKS = (Check(name="resets cleanly, and its states are the reader's own", run=plant_starts_afresh),)
+PLANT_CHECKS = (
+    Check(name="has all that a run uses", run=has_what_is_used),
+    Check(name="resets cleanly, and its states are the reader's own", run=plant_starts_afresh),
+)

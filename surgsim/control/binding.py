@@ -12,10 +12,11 @@ from surgsim.columns import Block
 from surgsim.compiled import address_of
 from surgsim.control.decision import ESTIMATOR, LAW, SOLVER
 from surgsim.control.failure import ControlFailure, failure_of
-from surgsim.control.port_estimators.base import PortEstimate, port_problem_of
+from surgsim.control.port_estimators.base import PortEstimate, PortEstimator, port_problem_of
 from surgsim.control.problem import Resolution
+from surgsim.control.resolvers.base import Resolver
 from surgsim.control.seen import fill_constants, velocity_problem_of
-from surgsim.control.torque_laws.base import torque_problem_of
+from surgsim.control.torque_laws.base import TorqueLaw, torque_problem_of
 from surgsim.errors import Outcome
 from surgsim.models.arm import ArmModel
 from surgsim.tick.arrays import Control, law_signature, new, point, resolver_signature
@@ -47,9 +48,9 @@ class ControllerParts:
         law: Torque law; None on the kinematic plant.
     """
 
-    port: Any
-    resolver: Any
-    law: Any
+    port: PortEstimator[Any]
+    resolver: Resolver[Any]
+    law: TorqueLaw[Any] | None
 
     @property
     def terms(self) -> tuple[str, ...]:
@@ -76,7 +77,7 @@ class ControllerParts:
 
 def new_control(
     arm: ArmModel, *, dt_s: float, has_trocar: bool, has_law: bool, omega_gain: float, at_reference: bool
-) -> Any:
+) -> Control:
     """The record of a controller's tick; `arm` must outlive it."""
     c = new(Control, arm.limits.q_min.size)
     c.has_law, c.at_reference, c.command.budget_j = has_law, at_reference, np.inf
@@ -114,7 +115,7 @@ class Bound:
 
     entered: dict[int, PythonPart]
     parts: ControllerParts
-    control: Any
+    control: Control
     arrays: PartArrays
     remembered: dict[int, Any]
 
@@ -138,7 +139,7 @@ class Bound:
         if who == SOLVER and hasattr(self.parts.resolver, "failure"):
             failure: ControlFailure = self.parts.resolver.failure(status, seen, self.arrays.resolver_memory)
             return failure
-        if who == LAW and hasattr(self.parts.law, "failure"):
+        if who == LAW and self.parts.law is not None and hasattr(self.parts.law, "failure"):
             failure = self.parts.law.failure(status, seen)
             return failure
         return failure_of(status, {}, {"q": seen.q.copy()})
@@ -152,7 +153,7 @@ def _status_of(error: BaseException) -> int:
     return INFEASIBLE if infeasible else TOLD
 
 
-def bind(parts: ControllerParts, control: Any, arm: ArmModel) -> Bound:
+def bind(parts: ControllerParts, control: Control, arm: ArmModel) -> Bound:
     """Join the parts to the record of a tick; those that are no compiled kernel are entered in Python."""
     entered: dict[int, PythonPart] = {}
     remembered: dict[int, Any] = {}
@@ -185,7 +186,9 @@ def bind(parts: ControllerParts, control: Any, arm: ArmModel) -> Bound:
     )
 
 
-def _port_call(port: Any, c: Any, minds: PartArrays, remembered: dict[int, Any]) -> Callable[[], int | None]:
+def _port_call(
+    port: Any, c: Control, minds: PartArrays, remembered: dict[int, Any]
+) -> Callable[[], int | None]:
     if hasattr(port, "kernel"):
         return lambda: port.kernel(port.gains, c.seen, minds.port_memory, c.port)
 
@@ -201,9 +204,10 @@ def _port_call(port: Any, c: Any, minds: PartArrays, remembered: dict[int, Any])
 
 
 def _resolver_call(
-    parts: ControllerParts, c: Any, minds: PartArrays, arm: ArmModel, remembered: dict[int, Any]
+    parts: ControllerParts, c: Control, minds: PartArrays, arm: ArmModel, remembered: dict[int, Any]
 ) -> Callable[[], int | None]:
-    resolver, seen, out = parts.resolver, c.referred if c.at_reference else c.seen, c.resolved
+    resolver: Any = parts.resolver
+    seen, out = c.referred if c.at_reference else c.seen, c.resolved
     limits = arm.limits
     if hasattr(resolver, "kernel"):
         return lambda: resolver.kernel(resolver.gains, seen, minds.resolver_memory, out)
@@ -224,7 +228,9 @@ def _resolver_call(
     return call
 
 
-def _law_call(law: Any, c: Any, minds: PartArrays, remembered: dict[int, Any]) -> Callable[[], int | None]:
+def _law_call(
+    law: Any, c: Control, minds: PartArrays, remembered: dict[int, Any]
+) -> Callable[[], int | None]:
     if hasattr(law, "kernel"):
         return lambda: law.kernel(law.gains, c.seen, minds.law_memory, minds.terms)
 

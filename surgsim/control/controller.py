@@ -2,24 +2,27 @@
 
 from copy import copy
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import PositiveFloat
 
-from surgsim.catalog import Name, PartConfig
+from surgsim.catalog import Name, PartConfig, Surroundings
 from surgsim.columns import Block, vector
 from surgsim.compiled import as_parameter
 from surgsim.control.binding import ControllerParts, bind, new_control
-from surgsim.control.decision import decide, decide_signature
+from surgsim.control.decision import decide, decide_signature, forget
 from surgsim.control.failure import ControlFailure
 from surgsim.control.port_estimators import PORT_ESTIMATORS
+from surgsim.control.port_estimators.base import PortEstimatorConfig
 from surgsim.control.port_estimators.measured import MeasuredPortConfig
 from surgsim.control.problem import Resolution
 from surgsim.control.redundancy import check_redundancy
 from surgsim.control.resolvers import RESOLVERS
+from surgsim.control.resolvers.base import ResolverConfig
 from surgsim.control.torque_laws import TORQUE_LAWS
+from surgsim.control.torque_laws.base import TorqueLawConfig
 from surgsim.models.arm import ArmModel
 from surgsim.plant.state import State
 from surgsim.tasks.base import TipCommand
@@ -28,9 +31,13 @@ from surgsim.tick.status import GOES_ON
 
 Array = NDArray[np.float64]
 
-AnyResolver: Any = RESOLVERS.union()
-AnyTorqueLaw: Any = TORQUE_LAWS.union()
-AnyPortEstimator: Any = PORT_ESTIMATORS.union()
+if TYPE_CHECKING:  # what a controller may use of a part, whichever it is
+    AnyResolver = ResolverConfig
+    AnyTorqueLaw = TorqueLawConfig
+    AnyPortEstimator = PortEstimatorConfig
+else:
+    AnyResolver, AnyTorqueLaw = RESOLVERS.union(), TORQUE_LAWS.union()
+    AnyPortEstimator = PORT_ESTIMATORS.union()
 
 
 class ControllerConfig(PartConfig):
@@ -53,6 +60,12 @@ class ControllerConfig(PartConfig):
     port: AnyPortEstimator = MeasuredPortConfig()
     evaluate_at: Literal["measured", "reference"] = "measured"
     position_gain_per_s: PositiveFloat = 10.0
+
+    def check(self, scenario: Surroundings) -> None:
+        """Refuse a scenario that one of the parts does not fit."""
+        for part in (self.resolver, self.torque_law, self.port):
+            if part is not None:
+                part.check(scenario)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -145,9 +158,10 @@ class Controller:
         return (*self.parts.columns, *port)
 
     @property
-    def objects(self) -> dict[str, Any]:
+    def objects(self) -> dict[str, object]:
         """What of the controller is a Python object with a state, by name."""
-        parts = {"port": self.parts.port, "resolver": self.parts.resolver, "torque_law": self.parts.law}
+        port, resolver, law = self.parts.port, self.parts.resolver, self.parts.law
+        parts: dict[str, object] = {"port": port, "resolver": resolver, "torque_law": law}
         named = {f"controller.{name}": part for name, part in parts.items() if not hasattr(part, "kernel")}
         return {**named, "controller's memory": self._bound.remembered}
 
@@ -164,7 +178,7 @@ class Controller:
 
     def reset(self) -> None:
         """Forget everything: the next tick is the first."""
-        self.control.seen.first = 1
+        forget(self.control)
 
     def tick(self, state: State, command: TipCommand) -> ControlOutput:
         """Command for the plant's `state`.

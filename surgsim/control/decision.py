@@ -1,4 +1,7 @@
-"""A controller's tick as a kernel: nominal model, port estimate, resolver, torque law, joint reference."""
+"""A controller's tick as a kernel: nominal model, port estimate, resolver, torque law, joint reference.
+
+What a controller's parts see is written here alone.
+"""
 
 from functools import cache
 from typing import Any
@@ -8,11 +11,7 @@ from numba import types
 from surgsim.compiled import call_at, compiled
 from surgsim.control.bounds import fill_velocity_bounds
 from surgsim.control.rcm import fill_rcm
-from surgsim.tick.arrays import (
-    Control,
-    Seen,
-    type_of,
-)
+from surgsim.tick.arrays import Control, Seen, World, type_of
 from surgsim.tick.nominal import copy_model, dynamics, kinematics
 from surgsim.tick.status import GOES_ON
 from surgsim.tick.views import doubles, numbers
@@ -25,6 +24,23 @@ ESTIMATOR, SOLVER, LAW = range(3)
 def decide_signature(n: int) -> Any:
     """Status = decide(control)."""
     return types.int64(type_of(Control, n))
+
+
+@compiled
+def measure(seen: Seen, world: World) -> None:
+    """Hand what is measured to the controller, before it decides."""
+    seen.t_s = world.t_s
+    for i in range(world.q.size):
+        seen.q[i], seen.v[i], seen.tau[i] = world.q_m[i], world.v_m[i], world.tau_m[i]
+    for i in range(3):
+        seen.f_T[i], seen.p_WC[i] = world.f_T_m[i], world.p_WC_m[i]
+        seen.v_WC[i], seen.a_WC[i] = world.v_WC_m[i], 0.0
+
+
+@compiled
+def forget(c: Control) -> None:
+    """The next tick is the first."""
+    c.seen.first = 1
 
 
 @compiled

@@ -1,12 +1,12 @@
 """How many degrees of freedom a part of a controller needs beside those that its tasks take."""
 
-from typing import Any
-
+from surgsim.control.resolvers.base import ResolverConfig
+from surgsim.control.torque_laws.base import TorqueLawConfig
 from surgsim.errors import SurgsimError
 from surgsim.models.arm import ArmModel
 
 
-def redundancy_needed(config: Any) -> int:
+def redundancy_needed(config: object) -> int:
     """Degrees of freedom that the part of `config` needs when the tip, and with a trocar the shaft, are held.
 
     A config says it as `needs_redundancy`; 0 if it does not. The roll about the shaft does not count, see
@@ -15,7 +15,9 @@ def redundancy_needed(config: Any) -> int:
     return int(getattr(config, "needs_redundancy", 0))
 
 
-def check_redundancy(config: Any, arm: ArmModel, has_trocar: bool) -> None:
+def check_redundancy(
+    config: ResolverConfig | TorqueLawConfig | None, arm: ArmModel, has_trocar: bool
+) -> None:
     """Refuse a part that needs more than the arm has.
 
     Raises:

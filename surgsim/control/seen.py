@@ -3,7 +3,6 @@
 Python reads a record's field by item in a quarter of the time of an attribute.
 """
 
-from typing import Any
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -17,11 +16,11 @@ from surgsim.tasks.command import command_of, fill_command_of
 from surgsim.tick.arrays import Seen, new
 
 Array = NDArray[np.float64]
-_blanks: WeakKeyDictionary[ArmModel, dict[tuple[float, bool, float], Any]] = WeakKeyDictionary()
+_blanks: WeakKeyDictionary[ArmModel, dict[tuple[float, bool, float], Seen]] = WeakKeyDictionary()
 
 
 def fill_constants(
-    seen: Any, arm: ArmModel, *, dt_s: float, has_trocar: bool, omega_gain: float, shared: bool = False
+    seen: Seen, arm: ArmModel, *, dt_s: float, has_trocar: bool, omega_gain: float, shared: bool = False
 ) -> None:
     """Write what does not change over a run."""
     limits = arm.limits
@@ -34,7 +33,7 @@ def fill_constants(
     arm.point(seen.elsewhere, shared=shared)
 
 
-def new_seen(arm: ArmModel, *, dt_s: float, has_trocar: bool, omega_gain: float = 1.0) -> Any:
+def new_seen(arm: ArmModel, *, dt_s: float, has_trocar: bool, omega_gain: float = 1.0) -> Seen:
     """A record for one call with `arm`, which must outlive it."""
     blanks = _blanks.setdefault(arm, {})
     blank = blanks.get((dt_s, has_trocar, omega_gain))
@@ -45,7 +44,7 @@ def new_seen(arm: ArmModel, *, dt_s: float, has_trocar: bool, omega_gain: float 
     return blank.copy()
 
 
-def kinematics_of(seen: Any) -> Kinematics:
+def kinematics_of(seen: Seen) -> Kinematics:
     """A copy of the kinematics."""
     return Kinematics(
         p_WT=seen["p_WT"].copy(),
@@ -57,12 +56,12 @@ def kinematics_of(seen: Any) -> Kinematics:
     )
 
 
-def dynamics_of(seen: Any) -> Dynamics:
+def dynamics_of(seen: Seen) -> Dynamics:
     """A copy of the dynamics."""
     return Dynamics(mass_matrix=seen["M"].copy(), bias=seen["bias"].copy())
 
 
-def rcm_of(seen: Any) -> Rcm | None:
+def rcm_of(seen: Seen) -> Rcm | None:
     """A copy of the RCM kinematics; None without a trocar."""
     if not seen["has_trocar"]:
         return None
@@ -75,7 +74,7 @@ def rcm_of(seen: Any) -> Rcm | None:
     )
 
 
-def velocity_problem_of(seen: Any, limits: JointLimits) -> VelocityProblem:
+def velocity_problem_of(seen: Seen, limits: JointLimits) -> VelocityProblem:
     """What a resolver in Python is given."""
     return VelocityProblem(
         t_s=float(seen["t_s"]),
@@ -94,7 +93,7 @@ def velocity_problem_of(seen: Any, limits: JointLimits) -> VelocityProblem:
     )
 
 
-def fill_velocity_problem(seen: Any, problem: VelocityProblem) -> None:
+def fill_velocity_problem(seen: Seen, problem: VelocityProblem) -> None:
     """Write what a resolver is given into a record."""
     seen["t_s"], seen["dt_s"], seen["omega_gain"] = problem.t_s, problem.dt_s, problem.position_gain_per_s
     seen["q"], seen["v"] = problem.q, problem.v
@@ -108,14 +107,14 @@ def fill_velocity_problem(seen: Any, problem: VelocityProblem) -> None:
     seen["v_max"], seen["a_max"] = limits.velocity, limits.acceleration
 
 
-def fill_kinematics(seen: Any, kin: Kinematics) -> None:
+def fill_kinematics(seen: Seen, kin: Kinematics) -> None:
     """Write kinematics into a record."""
     seen["p_WT"], seen["R_WT"] = kin.p_WT, kin.R_WT
     seen["Jv_WT"], seen["Jw_WT"] = kin.Jv_WT, kin.Jw_WT
     seen["z_W"], seen["anchors_W"] = kin.z_W, kin.anchors_W
 
 
-def fill_rcm_of(seen: Any, rcm: Rcm | None) -> None:
+def fill_rcm_of(seen: Seen, rcm: Rcm | None) -> None:
     """Write RCM kinematics into a record, if there are any."""
     if rcm is None:
         return

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from surgsim.catalog import PartConfig
 from surgsim.control.controller import ControllerConfig
 from surgsim.control.resolvers import RESOLVERS
+from surgsim.control.resolvers.base import ResolverConfig
 from surgsim.control.resolvers.pinv import PinvConfig
 from surgsim.control.resolvers.policy import PolicyConfig
 from surgsim.control.torque_laws.joint_impedance import JointImpedanceConfig
@@ -58,8 +59,8 @@ def with_agent(
     if action == "torque" and not scenario.plant.uses_torque:
         raise SurgsimError(f"the '{scenario.plant.type}' plant takes no torque: choose another action")
     own = scenario.controller
-    asked: Any = PinvConfig()  # with torques, its answer is recorded and not used
-    law: Any = own.torque_law
+    asked: ResolverConfig = PinvConfig()  # with torques, its answer is recorded and not used
+    law = own.torque_law
     if action == "torque":
         law = PolicyLawConfig(name=AGENT, add_bias=False, decimation=decimation)
     elif action == "joint_velocity":
@@ -85,11 +86,12 @@ def action_spec(scenario: Scenario, limits: JointLimits) -> specs.BoundedArray:
     return _symmetric("tip_velocity", np.full(3, resolver.tip_speed_max_m_per_s))
 
 
-def _inner(resolver: str | PartConfig) -> PartConfig:
+def _inner(resolver: str | PartConfig | ResolverConfig) -> PartConfig:
     if isinstance(resolver, PolicyConfig):
         return _inner(resolver.resolver)
     if isinstance(resolver, PartConfig):
         return resolver
+    assert isinstance(resolver, str)
     if resolver == "policy":
         raise SurgsimError("resolver 'policy' asks a policy itself: name the one below it")
     return RESOLVERS.config(resolver)()

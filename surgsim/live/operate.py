@@ -14,6 +14,7 @@ from surgsim.runs.folder import RunResult, check_target, result_of, write_run
 from surgsim.scenario.schema import Scenario
 from surgsim.simulate.loop import Progress, Simulation
 from surgsim.simulate.setup import Setup, prepare
+from surgsim.tasks.teleoperation import Teleoperation, TeleoperationConfig
 from surgsim.teleop.manual.hand import LiveHand
 from surgsim.teleop.manual.intent import Source
 from surgsim.teleop.manual.tape import Recorder, source_of
@@ -39,7 +40,7 @@ def operate(
         SurgsimError: If it is no teleoperation, the device, window or file is not there, the scenario cannot
             be started, or the folder cannot be written.
     """
-    if scenario.task.type != "teleoperation":
+    if not isinstance(scenario.task, TeleoperationConfig):
         raise SurgsimError(
             f"{scenario.name}: --operator needs task 'teleoperation', not '{scenario.task.type}'"
         )
@@ -73,10 +74,10 @@ def _live(scenario: Scenario, operator: str, folder: Path, record: bool) -> RunR
 
 def _start(scenario: Scenario, source: Source) -> tuple[Setup, Simulation]:
     """The simulation with a hand on the handle that follows `source`."""
-    setup = prepare(scenario)
-    task = scenario.task
-    hand = LiveHand(task.operator, task.mapping, source, scenario.simulation.control_period_s)
-    setup.task.hold(hand)  # type: ignore[attr-defined]
+    setup, config = prepare(scenario), scenario.task
+    assert isinstance(config, TeleoperationConfig)
+    assert isinstance(setup.task, Teleoperation)
+    setup.task.hold(LiveHand(config.operator, config.mapping, source, scenario.control_period_s))
     return setup, Simulation(setup)
 
 

@@ -6,7 +6,6 @@ the payload, friction or inertia errors that a scenario gives the plant.
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import mujoco
 import numpy as np
@@ -15,6 +14,7 @@ from numpy.typing import NDArray
 from surgsim.models.build import JointLimits, Scene, build_arm
 from surgsim.models.config import SceneConfig
 from surgsim.spatial import cross
+from surgsim.tick.arrays import Model
 
 Array = NDArray[np.float64]
 RCM_ROWS = 2
@@ -101,8 +101,8 @@ class ArmModel:
         """
         return int(self._model.nv) - 3 - RCM_ROWS * has_trocar - self.rolls_shaft
 
-    def point(self, record: Any, *, shared: bool = False) -> None:
-        """Let a `surgsim.tick.arrays.Model` record evaluate this arm, with data of its own or `shared` ones.
+    def point(self, record: Model, *, shared: bool = False) -> None:
+        """Let a record evaluate this arm, with data of its own or `shared` ones.
 
         This object must outlive the record. Shared data are those of this object's own evaluations.
         """

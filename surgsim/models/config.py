@@ -95,7 +95,7 @@ class WallConfig(PartConfig):
     seal_damping_n_s_per_m: NonNegativeFloat = 15.0
     tear_force_n: PositiveFloat = 30.0
 
-    def check(self, timestep_s: float) -> None:
+    def check_timestep(self, timestep_s: float) -> None:
         """Refuse what the timestep cannot follow.
 
         The cannula's mass m on stiffness k and explicit damping b is stable for k h²/m + 2 b h/m < 4 with
@@ -165,7 +165,7 @@ class SceneConfig(PartConfig):
                 f"instrument.shaft_diameter_m {self.instrument.shaft_diameter_m:g} must be below the bore, "
                 f"{self.trocar.bore_diameter_m:g}"
             )
-        self.trocar.wall.check(self.timestep_s)
+        self.trocar.wall.check_timestep(self.timestep_s)
         return self
 
     @property

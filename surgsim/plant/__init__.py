@@ -10,3 +10,5 @@ PLANTS = Catalog(
         "kinematic": "surgsim.plant.kinematic:KinematicPlantConfig",
     },
 )
+DEFAULT = "dynamic"
+"""The plant of a scenario that names none."""

@@ -15,6 +15,7 @@ from surgsim.columns import vector as vector_columns
 from surgsim.compiled import address_of, as_parameter, compiled
 from surgsim.errors import SurgsimError
 from surgsim.models.build import Scene
+from surgsim.plant.base import Plant
 from surgsim.plant.bore import Bore, act, drag, wall_force
 from surgsim.plant.bystanders import joint_columns
 from surgsim.plant.contacts import ContactWatch
@@ -71,7 +72,7 @@ class DynamicPlantConfig(PartConfig):
 
     def build(
         self, scene: Scene, control_period_s: float, parts: Sequence[PlantPart], seed: np.random.SeedSequence
-    ) -> "DynamicPlant":
+    ) -> Plant:
         """The plant; each part draws from a child of `seed`."""
         return DynamicPlant(scene, control_period_s, parts, seed, energy_ledger=self.energy_ledger)
 
@@ -258,12 +259,12 @@ class DynamicPlant:
         return self._data
 
     @property
-    def objects(self) -> dict[str, Any]:
+    def objects(self) -> dict[str, PlantPart]:
         """What of the plant is a Python object with a state, by name."""
         return {f"{type(part).__name__} ({k})": part for k, part in enumerate(self._parts)}
 
     @property
-    def arrays(self) -> dict[str, Any]:
+    def arrays(self) -> dict[str, Array]:
         """The rest of its state, by name: the parts' arrays, and what the jaws change in the model."""
         model = self._scene.model
         return {

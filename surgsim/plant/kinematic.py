@@ -1,7 +1,7 @@
 """Kinematic plant: perfect velocity tracking, the setting of the manipulability paper."""
 
 from collections.abc import Sequence
-from typing import Any, Literal
+from typing import Literal
 
 import mujoco
 import numpy as np
@@ -11,6 +11,7 @@ from surgsim.catalog import PartConfig
 from surgsim.columns import Block
 from surgsim.compiled import address_of, as_parameter, compiled
 from surgsim.models.build import Scene
+from surgsim.plant.base import Plant
 from surgsim.plant.bore import Bore
 from surgsim.plant.contacts import ContactWatch
 from surgsim.plant.dynamic import see_arm
@@ -39,7 +40,7 @@ class KinematicPlantConfig(PartConfig):
 
     def build(
         self, scene: Scene, control_period_s: float, parts: Sequence[PlantPart], seed: np.random.SeedSequence
-    ) -> "KinematicPlant":
+    ) -> Plant:
         """The plant; disturbances and props do not act on it."""
         return KinematicPlant(scene, control_period_s)
 
@@ -80,7 +81,7 @@ class KinematicPlant:
         self._data = mujoco.MjData(scene.model)
         n = len(scene.dof_ids)
         self.world, self.bore = world_of(scene, self._data, control_period_s), new(Bore, n)
-        self.hooks = HookTable((), (), n)
+        self.hooks = HookTable((), (), n, self.world)
         self._advance = as_parameter(advance_kinematics, advance_signature(n))
         self.advance = address_of(advance_kinematics, advance_signature(n))
         self._points = PointReader(scene, self._data)
@@ -92,12 +93,12 @@ class KinematicPlant:
         return self._data
 
     @property
-    def objects(self) -> dict[str, Any]:
+    def objects(self) -> dict[str, object]:
         """What of the plant is a Python object with a state: nothing."""
         return {}
 
     @property
-    def arrays(self) -> dict[str, Any]:
+    def arrays(self) -> dict[str, Array]:
         """The rest of its state: nothing."""
         return {}
 

@@ -16,7 +16,7 @@ Springs are those of slide and hinge joints. Source: the Störmer-Verlet scheme,
 Wanner, Geometric Numerical Integration, section I.1.
 """
 
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import mujoco
 import numpy as np
@@ -326,7 +326,7 @@ class EnergyLedger:
         damping = np.array(model.dof_damping).reshape(-1)
         self.gains = np.concatenate([np.zeros(LAW_SIZE), damping, weights, table.ravel()])
         self.memory = np.zeros(STATE_SIZE + _ROWS * model.nv + len(springs))
-        law: Any = laid_over(Law, self.gains)
+        law = laid_over(Law, self.gains)
         for name in ("actuator", "smooth", "passive", "constraint", "spring"):
             law[name] = getattr(data, f"qfrc_{name}").ctypes.data
         law.friction, law.entry[:] = self._friction.ctypes.data, self._entered.gains

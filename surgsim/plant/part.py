@@ -2,12 +2,13 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from surgsim.catalog import Surroundings
 from surgsim.columns import Block
 from surgsim.models.build import Scene
 from surgsim.plant.state import State
@@ -90,3 +91,19 @@ class PlantPart:
     def values(self) -> Array:
         """Values of `columns` now."""
         return np.zeros(0)
+
+
+class PlantPartConfig(Protocol):
+    """What a scenario needs of the config of a disturbance or prop."""
+
+    def check(self, scenario: Surroundings) -> None:
+        """Refuse a scenario that the part does not fit.
+
+        Raises:
+            ValueError: With the reason.
+        """
+        ...
+
+    def build(self, rng: np.random.Generator) -> PlantPart:
+        """The part, its values drawn from `rng` if they have a spread."""
+        ...

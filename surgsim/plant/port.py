@@ -5,8 +5,6 @@ The wall's spring and damper are those of the cannula's joints, which MuJoCo kno
 Why it is not one of MuJoCo's own contacts, and figures, are in docs/physical_port.md.
 """
 
-from typing import Any
-
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +13,7 @@ from surgsim.models.build import Scene
 from surgsim.models.config import WallConfig
 from surgsim.plant.bore import Bore, Push, act, drag, law, wall_force
 from surgsim.plant.records import world_of
-from surgsim.tick.arrays import new
+from surgsim.tick.arrays import World, new
 
 Array = NDArray[np.float64]
 _INSIDE = 1  # in the bore's memory
@@ -33,7 +31,7 @@ class Port:
         wall: The wall's forces, or None.
     """
 
-    def __init__(self, scene: Scene, data: mujoco.MjData, world: Any = None) -> None:
+    def __init__(self, scene: Scene, data: mujoco.MjData, world: World | None = None) -> None:
         self._data = data
         self._row = scene.port_mocap
         self._world = world_of(scene, data, float(scene.model.opt.timestep)) if world is None else world
@@ -83,7 +81,7 @@ class WallForces:
         bore: The record of the law.
     """
 
-    def __init__(self, scene: Scene, wall: WallConfig, data: mujoco.MjData, world: Any, bore: Any) -> None:
+    def __init__(self, scene: Scene, wall: WallConfig, data: mujoco.MjData, world: World, bore: Bore) -> None:
         model, cannula = scene.model, scene.cannula_dof_ids
         self._data, self._world, self.bore = data, world, bore
         self.dofs, self._arm, self._nv = _span(cannula), _span(scene.dof_ids), model.nv

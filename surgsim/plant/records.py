@@ -36,7 +36,7 @@ def world_of(
     *,
     disturbed: bool = False,
     touched: bool = False,
-) -> Any:
+) -> World:
     """The record of a plant in MuJoCo's `data`, which must outlive it."""
     model, n = scene.model, len(scene.dof_ids)
     world = new(World, n)

@@ -66,7 +66,7 @@ def call_hooks(kind: int, hooks: Hooks, world: World) -> int:
     return GOES_ON
 
 
-def measured(world: Any) -> State:
+def measured(world: World) -> State:
     """A copy of what is measured now."""
     return State(
         t_s=float(world.t_s),
@@ -116,7 +116,7 @@ class HookTable:
     """
 
     def __init__(
-        self, hooks: Sequence[Hook], parts: Sequence[tuple[PlantPart, int]], joints: int, world: Any = None
+        self, hooks: Sequence[Hook], parts: Sequence[tuple[PlantPart, int]], joints: int, world: World
     ) -> None:
         if len(hooks) > SLOTS:
             raise SurgsimError(f"plant, disturbances and props have {len(hooks)} hooks; at most {SLOTS} fit")
@@ -207,7 +207,7 @@ def overrides(part: PlantPart, hook: str) -> bool:
 
 
 def hook_call(
-    part: PlantPart, kind: int, scene: Scene, data: mujoco.MjData, world: Any, values: Callable[[], Array]
+    part: PlantPart, kind: int, scene: Scene, data: mujoco.MjData, world: World, values: Callable[[], Array]
 ) -> Callable[[], None]:
     """What enters a part's hook of a kind in Python, its answer written to the world's arrays."""
 

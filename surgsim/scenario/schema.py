@@ -2,7 +2,7 @@
 
 import hashlib
 import json
-from typing import Annotated, Any, Literal, Self
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 
 import numpy as np
 from pydantic import Field, NonNegativeInt, PositiveFloat, model_validator
@@ -10,19 +10,31 @@ from pydantic import Field, NonNegativeInt, PositiveFloat, model_validator
 from surgsim.catalog import Name, PartConfig
 from surgsim.control.controller import ControllerConfig
 from surgsim.models.config import InstrumentConfig, PerJoint, RobotConfig, SceneConfig, TrocarConfig
-from surgsim.plant import PLANTS
+from surgsim.plant import DEFAULT, PLANTS
+from surgsim.plant.base import PlantConfig
 from surgsim.plant.disturbances import DISTURBANCES
-from surgsim.plant.dynamic import DynamicPlantConfig
-from surgsim.plant.part import PlantPart
+from surgsim.plant.disturbances.base import DisturbanceConfig
+from surgsim.plant.part import PlantPart, PlantPartConfig
 from surgsim.plant.props import PROPS
 from surgsim.scenario.per_joint import check_lists
 from surgsim.scenario.thresholds import ThresholdsConfig
 from surgsim.tasks import TASKS
+from surgsim.tasks.base import TaskConfig
 
-AnyTask: Any = TASKS.union()
-AnyPlant: Any = PLANTS.union()
-AnyDisturbance: Any = DISTURBANCES.union()
-AnyProp: Any = PROPS.union()
+if TYPE_CHECKING:  # what the rest of the package may use of a part, whichever it is
+    AnyTask = TaskConfig
+    AnyPlant = PlantConfig
+    AnyDisturbance = DisturbanceConfig
+    AnyProp = PlantPartConfig
+else:
+    AnyTask, AnyPlant = TASKS.union(), PLANTS.union()
+    AnyDisturbance, AnyProp = DISTURBANCES.union(), PROPS.union()
+
+
+def _default_plant() -> AnyPlant:
+    config: Any = PLANTS.config(DEFAULT)
+    plant: AnyPlant = config()
+    return plant
 
 
 class StartConfig(PartConfig):
@@ -133,7 +145,7 @@ class Scenario(PartConfig):
     start: StartConfig = StartConfig()
     task: AnyTask
     controller: ControllerConfig
-    plant: AnyPlant = DynamicPlantConfig()
+    plant: AnyPlant = _default_plant()
     disturbances: tuple[AnyDisturbance, ...] = ()
     props: tuple[AnyProp, ...] = ()
     simulation: SimulationConfig = SimulationConfig()
@@ -158,22 +170,30 @@ class Scenario(PartConfig):
             raise ValueError("give task.start_m, or start.q_rad where the path then begins")
         if self.plant.uses_torque and self.controller.torque_law is None:
             raise ValueError(f"plant '{self.plant.type}' needs controller.torque_law")
-        if self.task.type == "teleoperation":
-            self.task.check(self.simulation.control_period_s, self.props)
-        for disturbance in self.disturbances:
-            disturbance.check(self.simulation.control_period_s)
         for key in ("disturbances", "props"):
             if getattr(self, key) and not self.plant.uses_torque:
                 raise ValueError(f"{key} do not act on the '{self.plant.type}' plant: leave them out")
         if self.trocar is not None and self.trocar.wall is not None:
             if not self.plant.uses_torque:
                 raise ValueError(f"a trocar.wall does not act on the '{self.plant.type}' plant: leave it out")
-            self.trocar.wall.check(self.simulation.timestep_s)
-        if self.controller.port.type == "interaction_force" and (
-            self.trocar is None or self.trocar.wall is None
-        ):
-            raise ValueError("controller.port 'interaction_force' feels no wall: give trocar.wall")
+            self.trocar.wall.check_timestep(self.simulation.timestep_s)
+        self.task.check(self)
+        self.plant.check(self)
+        self.controller.check(self)
+        parts: tuple[PlantPartConfig, ...] = (*self.disturbances, *self.props)
+        for part in parts:
+            part.check(self)
         return self
+
+    @property
+    def control_period_s(self) -> float:
+        """Time between control ticks [s]."""
+        return self.simulation.control_period_s
+
+    @property
+    def has_wall(self) -> bool:
+        """Whether there is a physical wall around the trocar."""
+        return self.trocar is not None and self.trocar.wall is not None
 
     @property
     def scene(self) -> SceneConfig:
@@ -188,7 +208,7 @@ class Scenario(PartConfig):
 
     def build_parts(self) -> list[PlantPart]:
         """Disturbances, then props, each with values drawn from its own child of the seed."""
-        configs = (*self.disturbances, *self.props)
+        configs: tuple[PlantPartConfig, ...] = (*self.disturbances, *self.props)
         children = np.random.SeedSequence(self.seed, spawn_key=(0,)).spawn(len(configs))
         pairs = zip(configs, children, strict=True)
         return [config.build(np.random.default_rng(child)) for config, child in pairs]

@@ -3,7 +3,6 @@
 import math
 from collections.abc import Callable
 from copy import copy
-from typing import Any
 
 import mujoco
 import numpy as np
@@ -13,8 +12,10 @@ from surgsim.columns import joints, width
 from surgsim.compiled import as_parameter
 from surgsim.errors import Outcome, SurgsimError
 from surgsim.plant.bore import Bore
+from surgsim.plant.contacts import Watch
 from surgsim.plant.part import BLOCK_TICKS
 from surgsim.plant.state import State
+from surgsim.plant.world import Hooks
 from surgsim.scenario.schema import Scenario, StopConfig
 from surgsim.simulate.objects import put_back, store
 from surgsim.simulate.rows import Rows
@@ -99,7 +100,7 @@ class Simulation:
         setup.task.reset()
         self._ask()
 
-    def _wire(self, last: int) -> Any:
+    def _wire(self, last: int) -> Run:
         """The record of the run."""
         setup, scenario = self._setup, self._setup.scenario
         run = new(Run, 0)
@@ -110,7 +111,7 @@ class Simulation:
         p.resolver_values = width(controller.columns) - 3 * controller.estimates
         p.clock_every = _CLOCK_EVERY if controller.is_compiled else 1
         self._task.told = run.feedback
-        for name in run.at.dtype.names:
+        for name in run.at.dtype.names or ():
             run.at[name] = self._rows.begins(name)[0]
         run.rows, run.columns = self._rows.data.ctypes.data, self._rows.data.shape[1]
         run.task, run.advance = self._task.kernel, setup.plant.advance
@@ -119,7 +120,7 @@ class Simulation:
         return run
 
     @property
-    def arguments(self) -> tuple[Any, ...]:
+    def arguments(self) -> tuple[Run, Control, World, Bore, Guard, Stop, Watch, Hooks]:
         """What the loop works on: the arguments of `run_ticks` after the number of ticks."""
         plant, controller = self._setup.plant, self._setup.controller
         return (
@@ -151,8 +152,7 @@ class Simulation:
     @property
     def state(self) -> State:
         """The plant's state at the present tick, as it is measured."""
-        state: State = self._setup.plant.state()
-        return state
+        return self._setup.plant.state()
 
     @property
     def command(self) -> TipCommand:
@@ -300,7 +300,7 @@ class Simulation:
         other.restore(self.snapshot())
         return other
 
-    def _records(self) -> dict[str, tuple[Any, type[Record]]]:
+    def _records(self) -> dict[str, tuple[Record, type[Record]]]:
         plant, control = self._setup.plant, self._setup.controller.control
         return {
             "run": (self._run, Run),
@@ -315,11 +315,11 @@ class Simulation:
         setup = self._setup
         return {"task_memory": self._task.memory, **setup.controller.arrays, **setup.plant.arrays}
 
-    def _objects(self) -> dict[str, Any]:
+    def _objects(self) -> dict[str, object]:
         setup = self._setup
         return {"task": setup.task, **setup.controller.objects, **setup.plant.objects}
 
-    def _shared(self) -> dict[str, Any]:
+    def _shared(self) -> dict[str, object]:
         """What belongs to this simulation, and stands by its name in a snapshot."""
         setup = self._setup
         records = {name: record for name, (record, _) in self._records().items()}

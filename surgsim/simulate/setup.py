@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any
+from typing import TypeGuard
 
 import mujoco
 import numpy as np
@@ -12,9 +12,10 @@ from surgsim.control.controller import Controller
 from surgsim.errors import SurgsimError, UnreachableError
 from surgsim.models.arm import ArmModel
 from surgsim.models.build import Scene, build
+from surgsim.plant.base import Plant
 from surgsim.scenario.schema import Scenario
 from surgsim.simulate.start import Reach, check_path, check_through_port, solve_start
-from surgsim.tasks.base import Task
+from surgsim.tasks.base import EnteringTaskConfig, Task, TaskConfig
 
 Array = NDArray[np.float64]
 MOST_TICKS = 4_000_000
@@ -39,7 +40,7 @@ class Setup:
     scene: Scene
     arm: ArmModel
     task: Task
-    plant: Any
+    plant: Plant
     controller: Controller
     q_start: Array
 
@@ -98,21 +99,19 @@ def _build_task(scenario: Scenario, start: Array) -> Task:
         SurgsimError: If it enters a port and there is none, or starts beside it.
     """
     config, period = scenario.task, scenario.simulation.control_period_s
-    if not _enters_port(scenario):
-        built: Task = config.build(start, period, scenario.task_seed())
-        return built
+    if not _enters(config):
+        return config.build(start, period, scenario.task_seed())
     if scenario.trocar is None:
         raise SurgsimError(f"{scenario.name}: task '{config.type}' needs a trocar")
     try:
-        built = config.build(start, period, scenario.task_seed(), trocar=scenario.trocar)
+        return config.build(start, period, scenario.task_seed(), trocar=scenario.trocar)
     except ValueError as error:
         raise SurgsimError(f"{scenario.name}: task: {error}") from error
-    return built
 
 
-def _enters_port(scenario: Scenario) -> bool:
+def _enters(config: TaskConfig) -> TypeGuard[EnteringTaskConfig]:
     """Whether the tip starts outside the patient."""
-    return bool(getattr(scenario.task, "enters_port", False))
+    return isinstance(config, EnteringTaskConfig) and config.enters_port
 
 
 def _check_length(scenario: Scenario, task: Task) -> None:
@@ -167,7 +166,7 @@ def _start_of(scenario_json: str) -> Array:
     given, p_start = scenario.start.q_rad, _path_start(scenario, arm)
     try:
         if scenario.trocar is not None:
-            entering = _enters_port(scenario)
+            entering = _enters(scenario.task)
             check_through_port(p_start, "the start at", scenario.instrument, scenario.trocar, entering)
         if given is None:
             q = solve_start(reach, arm, p_start, _posture(scenario, arm))
@@ -175,7 +174,7 @@ def _start_of(scenario_json: str) -> Array:
             q = _checked_start(reach, arm, np.array(given), p_start)
         if scenario.trocar is not None:
             task = _build_task(scenario, p_start)
-            check_path(reach, task, q, scenario.instrument, scenario.trocar, entering=_enters_port(scenario))
+            check_path(reach, task, q, scenario.instrument, scenario.trocar, entering=_enters(scenario.task))
     except UnreachableError as error:
         raise UnreachableError(f"{scenario.name}: {error}") from error
     q.flags.writeable = False

@@ -45,12 +45,12 @@ class Snapshot:
     ending: Ending | None
 
 
-def content_of(record: Any) -> bytes:
+def content_of(record: Record) -> bytes:
     """The bytes of a record."""
     return bytes(_bytes_of(record).tobytes())
 
 
-def fill(record: Any, kind: type[Record], content: bytes) -> None:
+def fill(record: Record, kind: type[Record], content: bytes) -> None:
     """Give a record the content of another one of its kind, but for the addresses in it."""
     own = _bytes_of(record)
     given = np.frombuffer(content, dtype=np.uint8).copy()
@@ -59,7 +59,7 @@ def fill(record: Any, kind: type[Record], content: bytes) -> None:
     own[:] = given
 
 
-def _bytes_of(record: Any) -> Bytes:
+def _bytes_of(record: Record) -> Bytes:
     """The memory of a record, not copied."""
     return np.asarray(record.base).view(np.uint8)
 

@@ -6,7 +6,7 @@ falls, and its instrument is in a patient.
 """
 
 import math
-from typing import Any, ClassVar
+from typing import ClassVar
 
 from surgsim.compiled import compiled
 from surgsim.models.arm import ArmModel
@@ -58,7 +58,7 @@ class Stop(Record):
     nominal: Model
 
 
-def new_stop(config: StopConfig, arm: ArmModel) -> Any:
+def new_stop(config: StopConfig, arm: ArmModel) -> Stop:
     """A stop that has not begun; `arm` must outlive it."""
     limits = arm.limits
     stop = new(Stop, limits.q_min.size)

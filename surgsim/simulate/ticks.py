@@ -13,7 +13,7 @@ from numba import types
 from numpy.typing import NDArray
 
 from surgsim.compiled import call_at, compiled
-from surgsim.control.decision import decide
+from surgsim.control.decision import decide, forget, measure
 from surgsim.plant.bore import Bore
 from surgsim.plant.contacts import Watch
 from surgsim.plant.world import Hooks
@@ -25,7 +25,6 @@ from surgsim.tick.arrays import (
     Feedback,
     Numbers,
     Record,
-    Seen,
     World,
     type_of,
 )
@@ -200,17 +199,6 @@ def _record(run: Run, row: Array, c: Control, limit: Array, took: float) -> None
 
 
 @compiled
-def _measure(seen: Seen, world: World) -> None:
-    """Hand what is measured to the controller."""
-    seen.t_s = world.t_s
-    for i in range(world.q.size):
-        seen.q[i], seen.v[i], seen.tau[i] = world.q_m[i], world.v_m[i], world.tau_m[i]
-    for i in range(3):
-        seen.f_T[i], seen.p_WC[i] = world.f_T_m[i], world.p_WC_m[i]
-        seen.v_WC[i], seen.a_WC[i] = world.v_WC_m[i], 0.0
-
-
-@compiled
 def _is_finite(values: Array) -> bool:
     return math.isfinite(dot(values, values))
 
@@ -285,7 +273,7 @@ def run_ticks(
         if not is_safe(guard, watch, world, c.command):
             p.reason = UNSAFE
             return k + 1
-        _measure(c.seen, world)
+        measure(c.seen, world)
         timed = world.tick % p.clock_every == 0
         before = thread_time() if timed else math.nan
         status = decide(c)
@@ -306,7 +294,7 @@ def run_ticks(
             if status == TOLD or not _bridges(p, c, world, status):
                 p.reason, p.status = FAILED, status
                 return k + 1
-            c.seen.first = 1  # what it remembers is not what the arm did
+            forget(c)  # what it remembers is not what the arm did
             brake(stop, world)
             _put(row, at.qdot_ref, stop.qdot)
             _put(row, at.q_ref, stop.q)

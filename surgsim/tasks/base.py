@@ -3,16 +3,16 @@
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Annotated, Any, ClassVar, Protocol, Self
+from typing import Annotated, Any, ClassVar, Protocol, Self, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, NonNegativeFloat, PositiveFloat, model_validator
 
-from surgsim.catalog import PartConfig
+from surgsim.catalog import PartConfig, Surroundings
 from surgsim.columns import Block
 from surgsim.compiled import compiled
-from surgsim.models.config import Vec3
+from surgsim.models.config import TrocarConfig, Vec3
 from surgsim.spatial import plane_axes
 from surgsim.tasks.profile import Profile
 from surgsim.tasks.success import RunColumns, Success, path_success
@@ -121,6 +121,61 @@ class Task(Protocol):
 
     def finished(self, t_s: float) -> bool:
         """Whether there is nothing left to do at `t_s` [s], before `duration_s`."""
+        ...
+
+
+class TaskConfig(Protocol):
+    """What a scenario needs of a task's config."""
+
+    @property
+    def type(self) -> str:
+        """Its name."""
+        ...
+
+    @property
+    def start_m(self) -> Vec3 | None:
+        """Where the path begins, world frame [m]; None: where the tip is in `start.q_rad`."""
+        ...
+
+    def check(self, scenario: Surroundings) -> None:
+        """Refuse a scenario that the task does not fit.
+
+        Raises:
+            ValueError: With the reason.
+        """
+        ...
+
+    def build(self, start: Array, period_s: float, seed: np.random.SeedSequence) -> Task:
+        """The task, its path beginning at `start` (3,) [m]; everything random in it comes from `seed`."""
+        ...
+
+    def success(self, run: RunColumns) -> Success:
+        """Whether the task was done in a run."""
+        ...
+
+
+@runtime_checkable
+class EnteringTaskConfig(TaskConfig, Protocol):
+    """Config of a task that may begin outside the patient: `build` is given the port.
+
+    Attributes:
+        enters_port: Whether it does.
+    """
+
+    enters_port: ClassVar[bool]
+
+    def build(
+        self,
+        start: Array,
+        period_s: float,
+        seed: np.random.SeedSequence,
+        trocar: TrocarConfig | None = None,
+    ) -> Task:
+        """The task through `trocar`.
+
+        Raises:
+            ValueError: If `start` is not in front of the port.
+        """
         ...
 
 

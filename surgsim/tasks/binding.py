@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from surgsim.compiled import address_of
 from surgsim.tasks.base import Feedback, Task
 from surgsim.tasks.command import fill_command
-from surgsim.tick.arrays import task_signature
+from surgsim.tick.arrays import Command, task_signature
 from surgsim.tick.python_part import PythonPart, python_kernel
 
 Array = NDArray[np.float64]
@@ -29,7 +29,7 @@ class BoundTask:
         memory: Its memory.
     """
 
-    def __init__(self, task: Task, command: Any) -> None:
+    def __init__(self, task: Task, command: Command) -> None:
         self._task, self._command = task, command
         kernel: Any = getattr(task, "kernel", None)
         self.told: Any = None

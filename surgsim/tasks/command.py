@@ -1,12 +1,12 @@
 """A task's command as the record of a tick and as an object."""
 
 import math
-from typing import Any
 
 from surgsim.tasks.base import EnergyBudget, TipCommand
+from surgsim.tick.arrays import Command, Seen
 
 
-def fill_command_of(out: Any, command: TipCommand) -> None:
+def fill_command_of(out: Command | Seen, command: TipCommand) -> None:
     """Write a command into a `Command` or `Seen`, a shift of the remote centre left out."""
     out["p_WTd"], out["v_WTd"], out["a_WTd"] = command.p_WTd, command.v_WTd, command.a_WTd
     out["roll_rate"], out["jaw"] = command.roll_rate, command.jaw
@@ -15,14 +15,14 @@ def fill_command_of(out: Any, command: TipCommand) -> None:
     out["budget_f_T"] = 0.0 if budget is None else budget.f_T
 
 
-def fill_command(out: Any, command: TipCommand) -> None:
+def fill_command(out: Command, command: TipCommand) -> None:
     """Write a command into a `Command`."""
     fill_command_of(out, command)
     out["rcm_shift"] = 0.0 if command.rcm_shift is None else command.rcm_shift
     out["rcm_shift_rate"] = 0.0 if command.rcm_shift_rate is None else command.rcm_shift_rate
 
 
-def command_of(told: Any) -> TipCommand:
+def command_of(told: Command | Seen) -> TipCommand:
     """A copy of the command in a `Command` or `Seen`; a shift of the remote centre is left out."""
     budget, most_j = None, float(told["budget_j"])
     if math.isfinite(most_j):

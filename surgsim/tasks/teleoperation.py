@@ -2,13 +2,13 @@
 
 from collections.abc import Callable, Sequence
 from functools import cached_property
-from typing import Any, Literal, Self
+from typing import Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import NonNegativeFloat, PositiveFloat, model_validator
 
-from surgsim.catalog import PartConfig
+from surgsim.catalog import PartConfig, Surroundings
 from surgsim.columns import width
 from surgsim.compiled import as_parameter
 from surgsim.models.config import Vec3
@@ -23,7 +23,7 @@ from surgsim.tasks.teleoperation_program import (
     rings_success,
     way_points,
 )
-from surgsim.teleop.channel import DRAW, ChannelConfig, draw_packets
+from surgsim.teleop.channel import DRAW, Channel, ChannelConfig, draw_packets
 from surgsim.teleop.console import Console, ConsoleConfig
 from surgsim.teleop.mapping import MappingConfig, align
 from surgsim.teleop.messages import MODES, PassivityMode
@@ -41,7 +41,7 @@ from surgsim.teleop.teleoperator import (
     places,
     teleoperate,
 )
-from surgsim.tick.arrays import task_signature
+from surgsim.tick.arrays import Command, task_signature
 from surgsim.tick.blank import new_command, new_feedback
 from surgsim.tick.overlay import laid_over, take
 from surgsim.tick.python_part import PythonPart
@@ -105,16 +105,16 @@ class TeleoperationConfig(PartConfig):
             raise ValueError("program 'peg_and_ring' makes its own goals: leave goals out")
         return self
 
-    def check(self, control_period_s: float, props: Sequence[Any]) -> None:
+    def check(self, scenario: Surroundings) -> None:
         """Refuse what does not fit the rest of the scenario.
 
         Raises:
             ValueError: If the console's steps do not fit the control period, or the board is not in `props`.
         """
-        self.console.substeps(control_period_s)
+        self.console.substeps(scenario.control_period_s)
         if self.program != "peg_and_ring":
             return
-        boards = [prop for prop in props if isinstance(prop, PegBoardLayout)]
+        boards = [prop for prop in scenario.props if isinstance(prop, PegBoardLayout)]
         if len(boards) != 1:
             raise ValueError(f"program 'peg_and_ring' needs one peg_board in props, not {len(boards)}")
         keys = PegBoardLayout.model_fields
@@ -239,7 +239,7 @@ class Teleoperation:
         if DRAWN - max(used) >= ticks:
             return
 
-        def packets(channel: Any, config: ChannelConfig, random: np.random.Generator) -> _Draw:
+        def packets(channel: Channel, config: ChannelConfig, random: np.random.Generator) -> _Draw:
             return lambda rows: draw_packets(config, channel, random, rows)
 
         def shakes(rows: Array) -> None:
@@ -296,7 +296,7 @@ class Teleoperation:
         return command_of(self._out)
 
     @cached_property
-    def _out(self) -> Any:
+    def _out(self) -> Command:
         return new_command()
 
     def values(self) -> Array:

@@ -6,7 +6,7 @@ depend on what is in it, so it is drawn ahead, a row for each packet.
 """
 
 import math
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 import numpy as np
 from pydantic import Field, NonNegativeFloat, model_validator
@@ -107,7 +107,7 @@ class Channel(Record):
     lost_packets: int
 
 
-def draw_packets(config: ChannelConfig, channel: Any, rng: np.random.Generator, rows: Array) -> None:
+def draw_packets(config: ChannelConfig, channel: Channel, rng: np.random.Generator, rows: Array) -> None:
     """Draw what happens to the coming packets (k, 3), see `LOST` and the following."""
     scale = config.jitter_s / np.sqrt(2.0)
 
@@ -127,7 +127,7 @@ def draw_packets(config: ChannelConfig, channel: Any, rng: np.random.Generator, 
             row[COPY] = extra()
 
 
-def _is_lost(config: ChannelConfig, channel: Any, rng: np.random.Generator) -> bool:
+def _is_lost(config: ChannelConfig, channel: Channel, rng: np.random.Generator) -> bool:
     loss, burst = config.loss, config.burst_packets
     if burst == 1.0:
         return bool(rng.random() < loss)

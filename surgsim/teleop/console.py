@@ -1,6 +1,6 @@
 """The master console: a force-controlled haptic arm in its own MuJoCo model, with its energy account."""
 
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import mujoco
 from pydantic import PositiveFloat
@@ -271,8 +271,8 @@ class Console:
         self.model.opt.timestep = period_s / self._substeps
         self.data = mujoco.MjData(self.model)
 
-    def describe(self, law: Any) -> None:
-        """Fill a `ConsoleLaw`, valid as long as this object lives."""
+    def describe(self, law: "ConsoleLaw") -> None:
+        """Fill the law, valid as long as this object lives."""
         c, model, data = self._c, self.model, self.data
         law.mj_model, law.mj_data = model._address, data._address
         for name in (
@@ -293,15 +293,15 @@ class Console:
         law.force_limit_n, law.least_mass_kg = c.force_limit_n, c.least_mass_kg
         law.torque_limit[:], law.damping[:] = model.jnt_actfrcrange[:, 1], model.dof_damping.reshape(-1)
 
-    def reset(self, law: Any, memory: Any) -> None:
-        """Put the arm at rest at its home pose; `memory`, a `ConsoleMemory`, must be zeros."""
+    def reset(self, law: "ConsoleLaw", memory: "ConsoleMemory") -> None:
+        """Put the arm at rest at its home pose; `memory` must be zeros."""
         mujoco.mj_resetDataKeyframe(self.model, self.data, self.model.key("home").id)
         mujoco.mj_step1(self.model, self.data)
         memory.potential_j = self.data.energy[0]
         measure_console(law, memory)
 
 
-def new_console(config: ConsoleConfig, period_s: float = 0.001) -> tuple[Console, Any, Any]:
+def new_console(config: ConsoleConfig, period_s: float = 0.001) -> tuple[Console, ConsoleLaw, ConsoleMemory]:
     """A console at rest with its numbers (`ConsoleLaw`) and its state (`ConsoleMemory`)."""
     console, law, memory = Console(config, period_s), new(ConsoleLaw, 0), new(ConsoleMemory, 0)
     console.describe(law)

@@ -1,6 +1,6 @@
 """Alignment of the console with the remote world, and the force law written in it."""
 
-from typing import Any, ClassVar, Self
+from typing import ClassVar, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -57,7 +57,7 @@ class Mapping(Record):
     home_W: Array
 
 
-def align(mapping: Any, config: MappingConfig, home_O: ArrayLike, home_W: ArrayLike) -> None:
+def align(mapping: Mapping, config: MappingConfig, home_O: ArrayLike, home_W: ArrayLike) -> None:
     """Let the handle at `home_O` (3,) [m] stand for the tip at `home_W` (3,) [m]."""
     mapping.scale, mapping.R_WO[:] = config.scale, rotation_matrix(config.rotation_wxyz)
     mapping.home_O[:], mapping.home_W[:] = home_O, home_W

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any, ClassVar, Protocol
+from typing import ClassVar, Protocol
 
 import numpy as np
 from pydantic import NonNegativeFloat, PositiveFloat
@@ -100,7 +100,7 @@ class HandCommand:
 class Hand(Protocol):
     """Whoever holds the handle in the simulated operator's place: a person, or an outside class."""
 
-    def step(self, t_s: float, seen_tip: Array, handle: Any) -> HandCommand:
+    def step(self, t_s: float, seen_tip: Array, handle: ConsoleState) -> HandCommand:
         """What the hand does in the period from `t_s`.
 
         Args:
@@ -123,7 +123,7 @@ class HandAction(Record):
     intended: Array
 
 
-def fill_action(action: Any, command: HandCommand) -> None:
+def fill_action(action: HandAction, command: HandCommand) -> None:
     """Write what a hand in Python does."""
     action.wrench[:], action.jaw, action.goal = command.wrench, command.jaw, command.goal
     action.done, action.missed, action.intended[:] = command.done, command.missed, command.intended
@@ -215,7 +215,7 @@ class Operator(Record):
     shake_before: Array
 
 
-def describe_operator(law: Any, config: OperatorConfig, period_s: float) -> float:
+def describe_operator(law: OperatorLaw, config: OperatorConfig, period_s: float) -> float:
     """Fill all numbers but mapping and places; answers the standard deviation of the tremor's noise [m]."""
     take(law, config)
     take(law.grip, config)

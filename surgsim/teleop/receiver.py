@@ -1,7 +1,7 @@
 """The receiving end of a channel: newest set point, energy counted once, fading when nothing arrives."""
 
 import math
-from typing import Any, ClassVar
+from typing import ClassVar
 
 from pydantic import NonNegativeFloat, PositiveFloat
 
@@ -60,7 +60,7 @@ class Receiver(Record):
     duplicate_packets: int
 
 
-def expect(law: Any, receiver: Any, memory: Array) -> None:
+def expect(law: ReceiverLaw, receiver: Receiver, memory: Array) -> None:
     """Begin: nothing has come."""
     receiver.highest, receiver.newest_s = -1, -math.inf
     memory[law.taken : law.taken + law.window] = -1.0

@@ -12,7 +12,7 @@ Notation of the names: docs/notation.md. Frames W world, T tip, C trocar.
 
 from collections.abc import Callable
 from functools import cache
-from typing import Any, ClassVar, get_type_hints
+from typing import TYPE_CHECKING, Any, ClassVar, Self, TypeVar, cast, get_type_hints
 
 import numpy as np
 from numba import from_dtype, types
@@ -45,6 +45,26 @@ class Record:
     SHAPES: ClassVar[dict[str, str]] = {}
     ADDRESSES: ClassVar[frozenset[str]] = frozenset()
 
+    if TYPE_CHECKING:  # `new` makes records of NumPy, which have these
+
+        @property
+        def dtype(self) -> np.dtype[Any]:
+            """Its layout."""
+
+        @property
+        def base(self) -> NDArray[Any]:
+            """The memory that it views."""
+
+        def copy(self) -> Self:
+            """Another one with the same content."""
+
+        def __getitem__(self, name: str) -> Any: ...
+
+        def __setitem__(self, name: str, value: object) -> None: ...
+
+
+R = TypeVar("R", bound=Record)
+
 
 @cache
 def layout(kind: Any, n: int) -> np.dtype[Any]:
@@ -69,9 +89,10 @@ def layout(kind: Any, n: int) -> np.dtype[Any]:
     return np.dtype(fields, align=True)
 
 
-def new(kind: Any, n: int) -> Any:
-    """A record of zeros."""
-    return np.zeros(1, layout(kind, n)).view(np.recarray)[0]
+def new(kind: type[R], n: int) -> R:
+    """A record of zeros: a record of NumPy, with the fields of `kind`."""
+    of: Any = kind
+    return cast(R, np.zeros(1, layout(of, n)).view(np.recarray)[0])
 
 
 @cache
@@ -96,8 +117,8 @@ class Numbers(Record):
     length: int
 
 
-def point(where: Any, array: Array) -> None:
-    """Fill in where `array` is; `where` is a record of `Numbers`.
+def point(where: Numbers, array: Array) -> None:
+    """Fill in where `array` is.
 
     Raises:
         SurgsimError: If the array is not of doubles that lie side by side.

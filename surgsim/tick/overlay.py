@@ -10,14 +10,15 @@ lengths begin.
 """
 
 from functools import cache
-from typing import Any
+from typing import Any, TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
-from surgsim.tick.arrays import layout
+from surgsim.tick.arrays import Record, layout
 
 Array = NDArray[np.float64]
+R = TypeVar("R", bound=Record)
 
 
 @cache
@@ -27,14 +28,15 @@ def overlay(kind: Any) -> tuple[Any, int]:
     return dtype, dtype.itemsize // 8
 
 
-def laid_over(kind: Any, array: Array) -> Any:
+def laid_over(kind: type[R], array: Array) -> R:
     """The record at the beginning of `array`, not copied."""
-    dtype, size = overlay(kind)
-    return array[:size].view(dtype)[0]
+    of: Any = kind
+    dtype, size = overlay(of)
+    return cast(R, array[:size].view(dtype)[0])
 
 
-def take(record: Any, config: Any) -> None:
+def take(record: Record, config: object) -> None:
     """Fill the numbers of a record that a config has by the same name."""
-    for name in record.dtype.names:
+    for name in record.dtype.names or ():
         if record.dtype[name] == np.float64 and hasattr(config, name):
             record[name] = getattr(config, name)

@@ -7,6 +7,7 @@ from typing import Any, Protocol, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from surgsim.catalog import Surroundings
 from surgsim.control.failure import ControlFailure, failure_of
 from surgsim.control.seen import dynamics_of, fill_kinematics, kinematics_of, new_seen
 from surgsim.models.arm import ArmModel, Dynamics, Kinematics
@@ -70,6 +71,27 @@ class PortEstimator(Protocol[Memory]):
         ...
 
 
+class PortEstimatorConfig(Protocol):
+    """What a controller needs of a port estimator's config."""
+
+    @property
+    def type(self) -> str:
+        """Its name."""
+        ...
+
+    def check(self, scenario: Surroundings) -> None:
+        """Refuse a scenario that the part does not fit.
+
+        Raises:
+            ValueError: With the reason.
+        """
+        ...
+
+    def build(self, arm: ArmModel) -> PortEstimator[Any]:
+        """The estimator for the nominal arm `arm`."""
+        ...
+
+
 @dataclass(frozen=True, kw_only=True)
 class KernelPortEstimator:
     """A port estimator that is a kernel: the loop calls the kernel, this calls it from Python.
@@ -110,7 +132,7 @@ class KernelPortEstimator:
         """Why there is no estimate."""
         return failure_of(status, {}, {"q": seen.q.copy()})
 
-    def _seen(self, p: PortProblem) -> Any:
+    def _seen(self, p: PortProblem) -> Seen:
         seen = new_seen(self.arm, dt_s=p.dt_s, has_trocar=False)
         seen.t_s, seen.v[:], seen.tau[:] = p.t_s, p.v, p.tau_measured
         fill_kinematics(seen, p.kin)

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, NonNegativeFloat, PositiveFloat
 
-from surgsim.catalog import PartConfig
+from surgsim.catalog import PartConfig, Surroundings
 from surgsim.compiled import compiled
 from surgsim.control.observer import observe, observer_size
 from surgsim.control.port_estimators.base import KernelPortEstimator
@@ -49,6 +49,11 @@ class InteractionForceConfig(PartConfig):
     harmonics: Annotated[int, Field(ge=1, le=8)] = 2
     harmonic_gain_m_per_n_s: NonNegativeFloat = 0.016
     most_m: PositiveFloat = 0.03
+
+    def check(self, scenario: Surroundings) -> None:
+        """Refuse a scenario without a wall."""
+        if not scenario.has_wall:
+            raise ValueError("controller.port 'interaction_force' feels no wall: give trocar.wall")
 
     def build(self, arm: ArmModel) -> KernelPortEstimator:
         """The estimator; memory tare (3,), offset (3,), ticks, waves (2 harmonics, 3), the observer's."""

@@ -7,6 +7,7 @@ from typing import Any, Protocol, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from surgsim.catalog import Surroundings
 from surgsim.columns import Block
 from surgsim.control.failure import ControlFailure, failure_of
 from surgsim.control.problem import Resolution, VelocityProblem
@@ -39,6 +40,27 @@ class Resolver(Protocol[Memory]):
             ControlFailure: If there is no answer, e.g. the problem is infeasible.
             numpy.linalg.LinAlgError: If the task Jacobian has lost rank.
         """
+        ...
+
+
+class ResolverConfig(Protocol):
+    """What a controller needs of a resolver's config."""
+
+    @property
+    def type(self) -> str:
+        """Its name."""
+        ...
+
+    def check(self, scenario: Surroundings) -> None:
+        """Refuse a scenario that the part does not fit.
+
+        Raises:
+            ValueError: With the reason.
+        """
+        ...
+
+    def build(self, arm: ArmModel) -> Resolver[Any]:
+        """The resolver for the nominal arm `arm`."""
         ...
 
 
@@ -84,19 +106,19 @@ class KernelResolver:
             raise self.failure(status, seen, after)
         return self._resolution(problem, out), after
 
-    def seen(self, problem: VelocityProblem) -> Any:
+    def seen(self, problem: VelocityProblem) -> Seen:
         """What the kernel sees of a problem."""
         seen = new_seen(self.arm, dt_s=problem.dt_s, has_trocar=problem.rcm is not None)
         fill_velocity_problem(seen, problem)
         return seen
 
-    def failure(self, status: int, seen: Any, memory: Array) -> ControlFailure:
+    def failure(self, status: int, seen: Seen, memory: Array) -> ControlFailure:
         """Why there is no answer."""
         data = {"q": seen.q.copy()} if self.examine is None else self.examine(self.gains, seen, memory)
         told = {of: text if isinstance(text, str) else text(seen) for of, text in self.failures.items()}
         return failure_of(status, told, data)
 
-    def _resolution(self, problem: VelocityProblem, out: Any) -> Resolution:
+    def _resolution(self, problem: VelocityProblem, out: Resolved) -> Resolution:
         told, width = problem.command, sum(len(block.columns) for block in self.columns)
         p, v, a = out["p_WTd"].copy(), out["v_WTd"].copy(), out["a_WTd"].copy()
         command = None

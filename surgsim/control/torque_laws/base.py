@@ -7,6 +7,7 @@ from typing import Any, Protocol, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from surgsim.catalog import Surroundings
 from surgsim.control.failure import ControlFailure, failure_of
 from surgsim.control.problem import Resolution
 from surgsim.control.rcm import Rcm
@@ -85,6 +86,27 @@ class TorqueLaw(Protocol[Memory]):
         ...
 
 
+class TorqueLawConfig(Protocol):
+    """What a controller needs of a torque law's config."""
+
+    @property
+    def type(self) -> str:
+        """Its name."""
+        ...
+
+    def check(self, scenario: Surroundings) -> None:
+        """Refuse a scenario that the part does not fit.
+
+        Raises:
+            ValueError: With the reason.
+        """
+        ...
+
+    def build(self, arm: ArmModel) -> TorqueLaw[Any]:
+        """The law for the nominal arm `arm`."""
+        ...
+
+
 @dataclass(frozen=True, kw_only=True)
 class KernelTorqueLaw:
     """A torque law that is a kernel: the loop calls the kernel, this calls it from Python.
@@ -151,7 +173,7 @@ def for_joints(key: str, given: Sequence[float] | None, profile: Sequence[float]
     return np.array(given, dtype=np.float64)
 
 
-def seen_of_torque(p: TorqueProblem, arm: ArmModel) -> Any:
+def seen_of_torque(p: TorqueProblem, arm: ArmModel) -> Seen:
     """What a torque law is given, as a record."""
     seen = new_seen(arm, dt_s=p.dt_s, has_trocar=p.rcm is not None)
     seen.t_s = p.t_s

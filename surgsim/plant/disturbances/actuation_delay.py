@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
+from surgsim.catalog import Surroundings
 from surgsim.compiled import compiled
 from surgsim.models.build import Scene
 from surgsim.plant.disturbances.base import DELAYED, Disturbance, DisturbanceConfig, whole_ticks
@@ -65,10 +66,10 @@ class ActuationDelayConfig(DisturbanceConfig):
     delay_s: Annotated[float, Field(gt=0.0, le=0.5)] = 0.005
     jitter_s: Annotated[float, Field(ge=0.0, le=0.5)] = 0.0
 
-    def check(self, control_period_s: float) -> None:
+    def check(self, scenario: Surroundings) -> None:
         """Refuse times that are no whole multiple of the control period."""
         for key in ("delay_s", "jitter_s"):
-            whole_ticks("actuation_delay", key, getattr(self, key), control_period_s)
+            whole_ticks("actuation_delay", key, getattr(self, key), scenario.control_period_s)
 
     def build(self, rng: np.random.Generator) -> "ActuationDelay":
         """The disturbance."""

@@ -1,6 +1,7 @@
 """What every disturbance has: its config's base and the spread over seeds."""
 
 import copy
+from abc import ABC, abstractmethod
 from typing import Annotated, Literal
 
 import numpy as np
@@ -67,15 +68,12 @@ def whole_ticks(name: str, key: str, time_s: float, control_period_s: float) -> 
     return round(ratio)
 
 
-class DisturbanceConfig(PartConfig):
+class DisturbanceConfig(PartConfig, ABC):
     """Base of a disturbance's config."""
 
-    def check(self, control_period_s: float) -> None:
-        """Refuse what does not fit the scenario.
-
-        Raises:
-            ValueError: With the reason.
-        """
+    @abstractmethod
+    def build(self, rng: np.random.Generator) -> PlantPart:
+        """The disturbance, its values drawn from `rng` if they have a spread."""
 
     @property
     def begins_s(self) -> float:

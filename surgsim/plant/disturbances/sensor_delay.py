@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
+from surgsim.catalog import Surroundings
 from surgsim.compiled import compiled
 from surgsim.models.build import Scene
 from surgsim.plant.disturbances.base import LATE, Disturbance, DisturbanceConfig, whole_ticks
@@ -70,9 +71,9 @@ class SensorDelayConfig(DisturbanceConfig):
     type: Literal["sensor_delay"] = "sensor_delay"
     delay_s: Annotated[float, Field(gt=0.0, le=0.5)] = 0.002
 
-    def check(self, control_period_s: float) -> None:
+    def check(self, scenario: Surroundings) -> None:
         """Refuse a delay that is no whole multiple of the control period."""
-        whole_ticks("sensor_delay", "delay_s", self.delay_s, control_period_s)
+        whole_ticks("sensor_delay", "delay_s", self.delay_s, scenario.control_period_s)
 
     def build(self, rng: np.random.Generator) -> "SensorDelay":
         """The disturbance."""

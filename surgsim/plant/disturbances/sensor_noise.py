@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, NonNegativeFloat, PositiveFloat
 
+from surgsim.catalog import Surroundings
 from surgsim.compiled import compiled
 from surgsim.models.build import Scene
 from surgsim.plant.disturbances.base import SENSOR, Disturbance, DisturbanceConfig
@@ -109,17 +110,17 @@ class SensorNoiseConfig(DisturbanceConfig):
     port_rate_hz: PositiveFloat | None = None
     tip_force_std_n: NonNegativeFloat = 0.05
 
-    def check(self, control_period_s: float) -> None:
+    def check(self, scenario: Surroundings) -> None:
         """Refuse a tracker or a low-pass faster than the control ticks can follow."""
-        if self.port_rate_hz is not None and self.port_rate_hz * control_period_s > 1.0 + 1e-9:
+        if self.port_rate_hz is not None and self.port_rate_hz * scenario.control_period_s > 1.0 + 1e-9:
             raise ValueError(
                 f"sensor_noise: port_rate_hz {self.port_rate_hz:g} must be at most one measurement a control "
-                f"period, {1.0 / control_period_s:g} Hz"
+                f"period, {1.0 / scenario.control_period_s:g} Hz"
             )
-        if self.velocity == "differentiated" and self.velocity_cutoff_hz * control_period_s > 0.5:
+        if self.velocity == "differentiated" and self.velocity_cutoff_hz * scenario.control_period_s > 0.5:
             raise ValueError(
                 f"sensor_noise: velocity_cutoff_hz {self.velocity_cutoff_hz:g} must be at most half the "
-                f"control rate, {0.5 / control_period_s:g} Hz"
+                f"control rate, {0.5 / scenario.control_period_s:g} Hz"
             )
 
     def build(self, rng: np.random.Generator) -> "SensorNoise":

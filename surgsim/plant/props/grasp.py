@@ -16,7 +16,6 @@ step late.
 """
 
 import math
-from typing import Any
 
 import mujoco
 import numpy as np
@@ -93,7 +92,7 @@ class Grasp(Record):
     ready: int
 
 
-def describe_grasp(law: Any, scene: Scene, data: mujoco.MjData, layout: PegBoardLayout) -> Array:
+def describe_grasp(law: GraspLaw, scene: Scene, data: mujoco.MjData, layout: PegBoardLayout) -> Array:
     """Fill the places in a model and its data; answers the rings' rows (k, 6)."""
     model = scene.model
     law.ring_radius_m, law.rim_radius_m = layout.ring_radius_m, layout.rim_radius_m
@@ -112,7 +111,7 @@ def describe_grasp(law: Any, scene: Scene, data: mujoco.MjData, layout: PegBoard
     return rows
 
 
-def open_jaws(law: Any, rings: Array, grasp: Any) -> None:
+def open_jaws(law: GraspLaw, rings: Array, grasp: Grasp) -> None:
     """Begin a run: nothing is held, and all rings touch the jaws."""
     grasp.held, grasp.leaving, grasp.ready = NOBODY, NOBODY, 1
     for ring in range(len(rings)):

@@ -205,6 +205,7 @@ class Timed(SimulatedCase):
         """The scenario with its QP timed."""
         scenario = self.shipped.scenario()
         controller = scenario.controller
+        assert isinstance(controller.resolver, PassiveQpConfig)
         resolver = TimedQpConfig(**controller.resolver.model_dump())
         return scenario.model_copy(
             update={"controller": controller.model_copy(update={"resolver": resolver})}

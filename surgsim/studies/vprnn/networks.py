@@ -78,6 +78,8 @@ def instant() -> Instant:
         position_gain_per_s=gain,
     )
     vprnn, rnn = (load_controller(name).resolver for name in ("vprnn", "rnn"))
+    assert isinstance(vprnn, VprnnConfig)
+    assert isinstance(rnn, RnnConfig)
     return Instant(problem=problem, arm=setup.arm, vprnn=vprnn, rnn=rnn)
 
 

@@ -1,11 +1,11 @@
 """A hand that follows a person's input."""
 
 import math
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from surgsim.teleop.console import ConsoleState
 from surgsim.teleop.impedance import Grip, hand_wrench
 from surgsim.teleop.manual.intent import Intent, Source
 from surgsim.teleop.mapping import MappingConfig, rotation_matrix
@@ -46,7 +46,7 @@ class LiveHand:
         self._position: Array | None = None
         self._jaw = 0.0
 
-    def step(self, t_s: float, seen_tip: Array, handle: Any) -> HandCommand:
+    def step(self, t_s: float, seen_tip: Array, handle: ConsoleState) -> HandCommand:
         """What the hand does in the period from `t_s` [s]; what it sees is for the person to judge."""
         if self._position is None:
             self._position, self._upright = handle.position.copy(), handle.rotation.copy()
@@ -64,7 +64,7 @@ class LiveHand:
             intended=intended,
         )
 
-    def _moved(self, position: Array, intent: Intent, handle: Any) -> Array:
+    def _moved(self, position: Array, intent: Intent, handle: ConsoleState) -> Array:
         self._velocity = self._velocity + self._blur * (self._R_OW @ intent.velocity - self._velocity)
         lead = position + self._period * self._velocity - handle.position
         length = math.sqrt(float(lead @ lead))
