@@ -16,11 +16,13 @@ class Compiling:
         kernel: Its name.
         most: How many kernels its process may have to compile, as far as it knows now.
         ended: Whether it is done.
+        awaited: Whether another process is at it, and this one waits; nothing is told when the wait ends.
     """
 
     kernel: str
     most: int
     ended: bool
+    awaited: bool = False
 
 
 Listener = Callable[[Compiling], None]

@@ -1,6 +1,7 @@
 """The files that say what surgsim is, to a person and to a machine: citation, changelog, types."""
 
 import re
+import subprocess
 import tomllib
 from pathlib import Path
 
@@ -29,6 +30,14 @@ def test_the_changelog_has_the_form_of_keep_a_changelog():
     assert all(re.fullmatch(r"\[\d+\.\d+\.\d+\] - \d{4}-\d\d-\d\d", version) for version in versions[1:])
     kinds = {"Added", "Changed", "Deprecated", "Removed", "Fixed", "Security"}
     assert set(re.findall(r"^### (.+)$", text, re.M)) <= kinds
+
+
+def test_every_file_has_a_name_that_was_meant():
+    listed = subprocess.run(["git", "-C", ROOT, "ls-files", "-z"], capture_output=True, text=True)
+    if listed.returncode != 0:  # not a checkout
+        return
+    names = [name for name in listed.stdout.split("\0") if name]
+    assert [name for name in names if not re.fullmatch(r"[\w./+-]+", name)] == []
 
 
 def test_the_package_says_that_it_is_typed():

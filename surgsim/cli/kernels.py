@@ -47,8 +47,13 @@ class _Shown:
         now = time.perf_counter()
         if self._last_s is None:
             self._last_s = now + _PATIENCE_S - _EVERY_S
-        self._count(told, now)
-        text = f"compiling kernels (once): {self._done} of at most {self._most}"
+        if not told.awaited:
+            self._count(told, now)
+            text = f"compiling kernels (once): {self._done} of at most {self._most}"
+        elif self._under_way:  # of a worker that another one keeps waiting
+            return
+        else:
+            text = "waiting for kernels that another process compiles"
         if self._terminal:
             self._said = True
             (_screens[-1] if _screens else _overwrite)(text)
@@ -67,9 +72,12 @@ class _Shown:
 
     def end(self) -> None:
         """Say what was done, if anything was said before."""
-        if self._said:
-            clear = "\r\x1b[K" if self._terminal else ""
-            text = f"compiled {self._done} kernels in {self._took_s:.0f} s; the next start finds them"
+        clear = "\r\x1b[K" if self._said and self._terminal else ""
+        if self._said and not self._done:
+            print(clear, end="", file=sys.stderr, flush=True)
+        elif self._said:
+            kernels = "kernel" if self._done == 1 else "kernels"
+            text = f"compiled {self._done} {kernels} in {self._took_s:.0f} s; the next start finds them"
             print(clear + text, file=sys.stderr, flush=True)
 
 

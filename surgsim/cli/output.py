@@ -71,7 +71,7 @@ def show_progress(label: str, quiet: bool = False) -> Iterator[ProgressCall | No
 
 
 _BAR = 16  # columns
-_BESIDE = _BAR + len(" 100.0/100.0 s  10.0x real time 0:00:00 ")
+_BESIDE = _BAR + len("   0:00:00")
 
 
 class _Description(ProgressColumn):
@@ -80,13 +80,17 @@ class _Description(ProgressColumn):
     def render(self, task: Task) -> Text:
         """Its text for the width of the terminal."""
         text = Text(task.description, no_wrap=True)
-        text.truncate(max(1, terminal_width(sys.stderr) - _BESIDE), overflow="ellipsis")
+        room = terminal_width(sys.stderr) - _BESIDE - len(task.fields["reached"])
+        text.truncate(max(1, room), overflow="ellipsis")
         return text
 
 
 @contextmanager
 def _bar(label: str) -> Iterator[Callable[[float, float, str], None]]:
-    """A bar; what is yielded takes how far it is, the whole, and the same in words."""
+    """A bar; what is yielded takes how far it is, the whole, and the same in words.
+
+    What has to be said meanwhile takes the place of the label and of the figures: it needs the room of both.
+    """
     columns = (
         _Description(),
         BarColumn(_BAR),
@@ -99,7 +103,7 @@ def _bar(label: str) -> Iterator[Callable[[float, float, str], None]]:
         def update(done: float, total: float, reached: str) -> None:
             bar.update(task, description=label, completed=done, total=total, reached=reached)
 
-        with on_screen(lambda text: bar.update(task, description=text)):
+        with on_screen(lambda text: bar.update(task, description=text, reached="")):
             yield update
 
 
@@ -109,7 +113,8 @@ def _run_bar(label: str) -> Iterator[ProgressCall]:
 
         def update(reached_s: float, duration_s: float) -> None:
             factor = f"{reached_s / max(working_time() - began, 1e-9):.1f}x real time"
-            bar(reached_s, duration_s, f"{reached_s:.1f}/{duration_s:.1f} s  {factor}")
+            beside = factor if reached_s < duration_s else "metrics, files"
+            bar(reached_s, duration_s, f"{reached_s:.1f}/{duration_s:.1f} s  {beside}")
 
         yield update
 

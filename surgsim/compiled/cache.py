@@ -111,7 +111,7 @@ class KernelCache(_Cache):
         if place is None:
             return None
         lock = CompileLock(place / entry)
-        lock.acquire((place / entry).is_file)
+        lock.acquire((place / entry).is_file, lambda: watch.awaits(self._kernel))
         found = self._load(entry, target_context)
         if found is None:
             self._locks[sig] = lock

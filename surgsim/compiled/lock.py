@@ -35,18 +35,22 @@ class CompileLock:
         self._path = entry.with_suffix(".lock")
         self._handle: int | None = None
 
-    def acquire(self, there: Callable[[], bool]) -> None:
+    def acquire(self, there: Callable[[], bool], waits: Callable[[], None]) -> None:
         """Wait until no other process compiles this kernel, or until the entry is `there`.
 
-        Where a file system knows no locks, or somebody holds one for too long, it goes on without.
+        `waits` is called once, if another process is at it. Where a file system knows no locks, or somebody
+        holds one for too long, it goes on without.
         """
-        until = time.monotonic() + _PATIENCE_S
+        until, said = time.monotonic() + _PATIENCE_S, False
         with suppress(OSError):
             self._handle = os.open(self._path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
             while not there() and time.monotonic() < until:
                 try:
                     fcntl.flock(self._handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
                 except BlockingIOError:
+                    if not said:
+                        waits()
+                        said = True
                     time.sleep(_PAUSE_S)
                 else:
                     _held.locks.append(self)

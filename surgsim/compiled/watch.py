@@ -47,6 +47,11 @@ def began(kernel: str) -> None:
     tell(Compiling(kernel=kernel, most=_most(), ended=False))
 
 
+def awaits(kernel: str) -> None:
+    """Tell that another process compiles a kernel that is needed here."""
+    tell(Compiling(kernel=kernel, most=_most(), ended=False, awaited=True))
+
+
 def ended(kernel: str) -> None:
     """Tell that a kernel was compiled."""
     _counts.compiled += 1

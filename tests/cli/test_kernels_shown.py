@@ -7,7 +7,6 @@ import pytest
 
 from surgsim.cli import kernels
 from surgsim.cli.kernels import compiling_shown, on_screen
-from surgsim.cli.output import show_batch_progress, show_progress
 from surgsim.compiled import watch
 from surgsim.compiling import Compiling, tell
 
@@ -59,14 +58,56 @@ def test_one_line_on_a_terminal(capsys, monkeypatch):
     )
 
 
-@pytest.mark.parametrize("bar", [show_progress, show_batch_progress])
-def test_a_bar_shows_it_in_the_place_of_its_label(bar, capsys, monkeypatch):
+def test_waiting_for_another_process_is_said_unless_workers_wait_for_each_other(capsys, monkeypatch):
     monkeypatch.setattr(sys.stderr, "isatty", lambda: True, raising=False)
-    monkeypatch.setenv("COLUMNS", "80")
-    with compiling_shown(), bar("my label"):
-        compile_two()
+    with compiling_shown():
+        tell(Compiling(kernel="a", most=7, ended=False, awaited=True))
+    waiting = "waiting for kernels that another process compiles"
+    assert capsys.readouterr().err == f"\r\x1b[K{waiting}\r\x1b[K"
+    with compiling_shown():
+        tell(Compiling(kernel="a", most=7, ended=False))
+        tell(Compiling(kernel="a", most=7, ended=False, awaited=True))
+        tell(Compiling(kernel="a", most=7, ended=True))
+    said = capsys.readouterr().err
+    assert waiting not in said
+    assert "compiled 1 kernel in 0 s" in said
+
+
+IN_A_BAR = """
+import time
+from surgsim.cli.kernels import compiling_shown
+from surgsim.cli.output import show_batch_progress, show_progress
+from surgsim.compiling import Compiling, tell
+
+def compile_one():
+    for ended in (False, True):
+        tell(Compiling(kernel="a", most=185, ended=ended))
         time.sleep(0.3)  # the bar is drawn ten times a second
-    assert "compiling kernels (once): 2 of at most 7" in capsys.readouterr().err
+
+with compiling_shown(), {bar}("a scenario and a controller") as update:
+    compile_one()
+    update(*{reached})
+    time.sleep(0.3)
+    compile_one()
+"""
+
+
+@pytest.mark.parametrize(
+    ("bar", "reached"), [("show_progress", (7.0, 7.0)), ("show_batch_progress", (5, 1000, "completed"))]
+)
+@pytest.mark.parametrize("columns", [80, 120])
+def test_a_bar_says_how_many_kernels_there_are_and_are_done(terminal, bar, reached, columns):
+    done = terminal(sys.executable, "-c", IN_A_BAR.format(bar=bar, reached=reached), columns=columns).wait()
+    assert done.status == 0, done.text
+    for count in (0, 1, 2):
+        shown = f"compiling kernels (once): {count} of at most 185 "
+        assert any(line.startswith(shown) for line in done.lines), done.text
+    assert all(len(line) <= columns for line in done.lines)
+
+
+def test_a_bar_that_is_full_says_what_goes_on(terminal):
+    done = terminal(sys.executable, "-c", IN_A_BAR.format(bar="show_progress", reached=(7.0, 7.0))).wait()
+    assert any("7.0/7.0 s  metrics, files" in line for line in done.lines), done.text
 
 
 def test_clocks_stand_still_while_a_kernel_compiles():

@@ -1,5 +1,6 @@
 """What is kept is used again, whatever happened to it meanwhile."""
 
+import fcntl
 import hashlib
 import os
 import pickle
@@ -10,6 +11,7 @@ import time
 import pytest
 
 from surgsim.compiled import cache
+from surgsim.compiling import listening
 
 KERNEL = "from surgsim.compiled import compiled\n@compiled\ndef twice(x):\n    return 2.0 * x\n"
 
@@ -110,6 +112,26 @@ def test_a_kernel_that_does_not_compile_lets_the_next_process_try(workshop):
         with pytest.raises(Exception, match="no_such_name"):
             workshop.run("user").twice(1.0)
     assert list(workshop.kept.glob("*")) == []
+
+
+def test_who_waits_for_another_process_is_told(workshop):
+    workshop.write(user=KERNEL)
+    told = []
+
+    def release(compiling):
+        told.append((compiling.kernel, compiling.awaited, compiling.ended))
+        if compiling.awaited:
+            fcntl.flock(held, fcntl.LOCK_UN)
+
+    workshop.run("user").twice(1.0)
+    (entry,) = workshop.entries()
+    entry.unlink()
+    held = os.open(entry.with_suffix(".lock"), os.O_RDWR | os.O_CREAT)
+    fcntl.flock(held, fcntl.LOCK_EX)
+    with listening(release):
+        assert workshop.run("user").twice(1.0) == 2.0
+    os.close(held)
+    assert told == [("user.twice", True, False), ("user.twice", False, False), ("user.twice", False, True)]
 
 
 SCRIPT = """
