@@ -24,8 +24,9 @@ class Limits:
         fill_acceleration_bounds(seen, q, v, low, high)
         return low, high
 
-    def allows(self, torque, qddot, low, high):
-        return allows(torque, self.torque, qddot, low, high)
+    def allows(self, torque, qddot, q, v):
+        seen = new_seen(self.arm, dt_s=DT, has_trocar=False)
+        return allows(torque, self.torque, qddot, seen, q, v)
 
 
 seeds = pytest.mark.parametrize("seed", range(4))
@@ -74,14 +75,22 @@ def test_a_joint_beyond_its_range_may_not_go_further(arm, limits):
 
 
 def test_allowed_is_what_keeps_torque_and_acceleration(arm, limits):
-    low, high, zero = -np.ones(7), np.ones(7), np.zeros(7)
-    assert limits.allows(0.99 * arm.limits.torque, zero, low, high)
+    """What is asked of the bound on a joint's way alone is what both bounds of every joint say."""
+    rng, zero, found = np.random.default_rng(5), np.zeros(7), []
+    middle, half = 0.5 * (arm.limits.q_min + arm.limits.q_max), 0.5 * (arm.limits.q_max - arm.limits.q_min)
+    for _ in range(2000):
+        q = middle + half * rng.uniform(-1.02, 1.02, 7) ** 3
+        v = 1.02 * arm.limits.velocity * rng.uniform(-1.0, 1.0, 7) ** 5
+        low, high = limits.bounds(q, v, DT)
+        qddot = low + (high - low) * rng.uniform(-0.02, 1.02, 7)
+        found.append(limits.allows(zero, qddot, q, v))
+        assert found[-1] == ((low <= qddot) & (qddot <= high)).all()
+    assert 200 < sum(found) < 1800
+    assert limits.allows(0.99 * limits.torque, zero, middle, zero)
     for joint in range(7):
-        one = np.eye(7)[joint]
-        assert not limits.allows(-arm.limits.torque * one, zero, low, high)
-        assert not limits.allows(zero, 1.01 * one, low, high)
-        assert not limits.allows(zero, -1.01 * one, low, high)
-    assert not limits.allows(np.full(7, np.nan), zero, low, high)
+        assert not limits.allows(-arm.limits.torque * np.eye(7)[joint], zero, middle, zero)
+    assert not limits.allows(np.full(7, np.nan), zero, middle, zero)
+    assert not limits.allows(zero, np.full(7, np.nan), middle, zero)
 
 
 @pytest.fixture
