@@ -98,9 +98,10 @@ def _are_parts(values: list[Any]) -> bool:
 
 
 def _shown(value: Any) -> str:
-    """A value as in a scenario, or its beginning if it is long."""
+    """A value as in a scenario, or its first words or numbers if it is long."""
     text = "-" if value is None else value if isinstance(value, str) else json.dumps(value)
-    return text if len(text) <= _LONGEST_VALUE else f"{text[: _LONGEST_VALUE - 3]}..."
+    beginning = text[:_LONGEST_VALUE].rpartition(" ")[0] if len(text) > _LONGEST_VALUE else ""
+    return f"{beginning} ..." if beginning else text
 
 
 def _minus(b: float | None, a: float | None) -> float | None:

@@ -10,7 +10,7 @@ import pytest
 from batches import Here, short_run
 from rerun.chunk import RrdReader
 
-from surgsim.cli.inspect_pair import differing, largest_gap_mm
+from surgsim.cli.inspect_pair import _shown, differing, largest_gap_mm
 from surgsim.cli.main import main
 from surgsim.compare.engine import Batch, compare
 from surgsim.compare.suite import SuiteConfig
@@ -70,6 +70,14 @@ def test_two_recordings_are_compared(runs, capsys, monkeypatch, tmp_path):
     largest = float(lines[-1].removeprefix("largest distance between the two tips: ").split()[0])
     assert 1.0 < largest < 10.0
     assert list(tmp_path.iterdir()) == [], "nothing is written unless asked for"
+
+
+def test_a_long_value_is_cut_between_words_and_between_numbers():
+    text = "LWR4+ follows a circle (R 2 cm) through a fixed trocar"
+    assert _shown(text) == "LWR4+ follows a circle (R 2 cm) through ..."
+    numbers = [1.5708, -0.5236, 0.0, 1.5708, 0.0, -1.0472, 0.5]
+    assert _shown(numbers) == "[1.5708, -0.5236, 0.0, 1.5708, 0.0, ..."
+    assert (_shown("a" * 60), _shown(None)) == ("a" * 60, "-")
 
 
 def test_the_difference_as_json(runs, batch, capsys):
