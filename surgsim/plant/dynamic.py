@@ -17,9 +17,9 @@ from surgsim.errors import SurgsimError
 from surgsim.models.build import Scene
 from surgsim.plant.base import Plant
 from surgsim.plant.bore import Bore, act, drag, wall_force
-from surgsim.plant.bystanders import joint_columns
 from surgsim.plant.contacts import ContactWatch
 from surgsim.plant.ledger import EnergyLedger, after_step, before_step, fill_terms
+from surgsim.plant.other_joints import joint_columns
 from surgsim.plant.part import BLOCK_TICKS, PlantPart
 from surgsim.plant.port import forget, new_bore
 from surgsim.plant.records import world_of
