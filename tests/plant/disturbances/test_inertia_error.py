@@ -5,7 +5,7 @@ import pytest
 
 from surgsim.plant.disturbances.inertia_error import InertiaErrorConfig
 
-ARMATURE = 0.1  # of assets/lwr4plus
+ARMATURE = 0.1  # of assets/robots/lwr4plus
 seeds = pytest.mark.parametrize("seed", range(3))
 
 
