@@ -37,7 +37,7 @@ class Hooks(Record):
 
     Attributes:
         table: Address of the hooks of each kind in turn: address of the kernel, addresses and sizes of its
-            part's gains, memory and columns (kinds, SLOTS, 7).
+            part's gains, memory and columns, seven words for each (kinds, SLOTS).
         counts: Address of how many there are of each kind (kinds,).
         values: The plant's own columns.
     """

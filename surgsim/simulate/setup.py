@@ -82,7 +82,7 @@ def prepare(scenario: Scenario) -> Setup:
 
 
 def beginning(scenario: Scenario, arm: ArmModel) -> tuple[Array, Task]:
-    """Start configuration (7,) [rad], and the task, of a scenario whose nominal arm is `arm`.
+    """Start configuration (n,) [rad], and the task, of a scenario whose nominal arm is `arm`.
 
     Raises:
         UnreachableError: If start or path cannot be reached through the trocar.

@@ -87,7 +87,7 @@ class OperatorSide(Record):
         wrench: What the motors are to render, force and zeros (6,) [N, N m].
         desired: Force before the tank or the passivity controller (3,) [N].
         path: Motion of the handle over the period (3,) [m].
-        content: The message (7,).
+        content: The message, seven numbers.
         console: The console.
         hand: What the hand does.
         operator: The simulated operator.

@@ -77,7 +77,7 @@ class State(Record):
         is_done: Whether the operator is done.
         done_s: Since when [s].
         velocity: v_d of the last period (3,) [m/s].
-        content: The message of the remote side (7,).
+        content: The message of the remote side, seven numbers.
         operator: The operator's side.
         remote: The remote side.
         forth: The channel to the remote side.

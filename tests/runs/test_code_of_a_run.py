@@ -45,7 +45,11 @@ def test_the_hash_is_that_of_what_can_change_a_run_and_git_is_not_asked(tmp_path
             (package / name).write_text("changed", encoding="utf-8")
             assert found() == first, name
         seen = {first}
-        for name in ("surgsim/control/controller.py", "surgsim/new.py", "assets/robots/lwr4plus/lwr4plus.xml"):
+        for name in (
+            "surgsim/control/controller.py",
+            "surgsim/new.py",
+            "assets/robots/lwr4plus/lwr4plus.xml",
+        ):
             (tmp_path / name).write_text("changed", encoding="utf-8")
             seen.add(found())
         (package / "new.py").rename(package / "newer.py")

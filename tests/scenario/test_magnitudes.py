@@ -107,7 +107,9 @@ SIZES = st.one_of(
     st.floats(-30.0, 15.0).map(lambda power: 10.0**power),
     st.sampled_from([1e-30, 1e-12, 1e-9, 1.0, 99.0, 1e3, 1e6, 1e9, 1e12, 1e15]),
 )
-NUMBERS = st.one_of(SIZES, SIZES.map(lambda size: -size), st.just(0.0), st.floats(allow_nan=False, allow_infinity=False))
+NUMBERS = st.one_of(
+    SIZES, SIZES.map(lambda size: -size), st.just(0.0), st.floats(allow_nan=False, allow_infinity=False)
+)
 
 
 @settings(max_examples=60, deadline=None, suppress_health_check=list(HealthCheck))
