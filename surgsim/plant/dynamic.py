@@ -52,7 +52,6 @@ from surgsim.tick.views import doubles, site_place, vector
 Array = NDArray[np.float64]
 _FIRST_PART = 2
 """Own columns and the ledger stand before the parts."""
-_TERMS = len(EnergyLedger.COLUMNS)
 
 
 class DynamicPlantConfig(PartConfig):

@@ -10,7 +10,6 @@ for bit.
 Notation of the names: docs/notation.md. Frames W world, T tip, C trocar.
 """
 
-from collections.abc import Callable
 from functools import cache
 from typing import TYPE_CHECKING, Any, ClassVar, Self, TypeVar, cast, get_type_hints
 
@@ -21,14 +20,11 @@ from numpy.typing import NDArray
 from surgsim.errors import SurgsimError
 
 Array = NDArray[np.float64]
-Kernel = Callable[..., int]
 Ids = NDArray[np.int64]
 
 A1 = types.float64[::1]
 A2 = types.float64[:, ::1]
-A3 = types.float64[:, :, ::1]
 I1 = types.int64[::1]
-I2 = types.int64[:, ::1]
 MOST_JOINTS = 8
 """Most joints of an arm; kernels set room aside for them."""
 MOST_VALUES = 64
