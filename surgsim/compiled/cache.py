@@ -17,17 +17,20 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
+from numba.core import sigutils
 from numba.core.caching import _Cache
-from numba.core.compiler import CompileResult
 from numba.core.errors import NumbaWarning
 from numba.core.serialize import dumps
 
 from surgsim.compiled import watch
 from surgsim.compiled.identity import UnknownValueError, identity
+from surgsim.compiled.library import KernelLibrary, expect, rebuilt
 from surgsim.compiled.lock import CompileLock
 from surgsim.compiled.places import places, prepared, usable
 
 SUFFIX = ".nbi"
+ENTRANCE = ".from_python"
+"""What follows the name of a kernel in that of its entrance."""
 MOST_ENTRIES = 1500
 _MAGIC = b"surgsim kernel 1\n"
 _DAY_S, _HOUR_S = 86_400.0, 3_600.0
@@ -36,10 +39,13 @@ _DAY_S, _HOUR_S = 86_400.0, 3_600.0
 class KernelCache(_Cache):
     """What numba asks for compiled code of one kernel, and gives it to."""
 
-    def __init__(self, dispatcher: Any) -> None:
-        self._dispatcher = dispatcher
+    def __init__(self, dispatcher: Any, compiled: Any) -> None:
+        """The cache of a dispatcher that compiles the function `compiled`, which may only call its own."""
+        self._dispatcher, self._compiled = dispatcher, compiled
         function = dispatcher.py_func
         self._kernel = f"{function.__module__}.{function.__qualname__}".replace("<locals>.", "")
+        if compiled is not function:
+            self._kernel += ENTRANCE
         self._entry_of: dict[Any, str | None] = {}
         self._locks: dict[Any, CompileLock] = {}
         self._enabled = True
@@ -64,10 +70,11 @@ class KernelCache(_Cache):
         """The kernel compiled for `sig`; None if it has to be compiled."""
         target_context.refresh()
         entry = self._entry(sig, target_context.codegen().magic_tuple())
-        found = None if entry is None else self._load(entry, target_context)
+        found = None if entry is None else _load(entry, target_context)
         if found is None and entry is not None:
             found = self._wait(sig, entry, target_context)
         if found is None:
+            self._expect(sig, entry)
             watch.began(self._kernel)
         else:
             watch.loaded()
@@ -78,7 +85,9 @@ class KernelCache(_Cache):
         try:
             entry = self._entry(sig, data.codegen.magic_tuple())
             if entry is not None and self._may_be_kept(data):
-                _write(entry, dumps(data._reduce()))
+                _write(entry, _content(data))
+                data.library.entry = entry
+                _RESULTS[entry] = data
         finally:
             lock = self._locks.pop(sig, None)
             if lock is not None:
@@ -97,13 +106,12 @@ class KernelCache(_Cache):
                 self._entry_of[sig] = None
         return self._entry_of[sig]
 
-    def _load(self, entry: str, target_context: Any) -> Any:
-        for place in places():
-            payload = _read(place / entry) if usable(place) else None
-            if payload is not None:
-                with suppress(Exception):  # whatever is wrong with it, it can be compiled
-                    return CompileResult._rebuild(target_context, *pickle.loads(payload))
-        return None
+    def _expect(self, sig: Any, entry: str | None) -> None:
+        """Give the kernel that is to be compiled the name of its entry's key."""
+        key = None if entry is None else entry.removesuffix(SUFFIX).rpartition("-")[2]
+        arguments, _ = sigutils.normalize_signature(sig)
+        from_python = not self._dispatcher.targetoptions.get("no_cpython_wrapper", False)
+        expect(self._compiled, tuple(arguments), from_python, key)
 
     def _wait(self, sig: Any, entry: str, target_context: Any) -> Any:
         """The kernel, if another process is compiling it; else this one is to, and the others wait."""
@@ -112,7 +120,7 @@ class KernelCache(_Cache):
             return None
         lock = CompileLock(place / entry)
         lock.acquire((place / entry).is_file, lambda: watch.awaits(self._kernel))
-        found = self._load(entry, target_context)
+        found = _load(entry, target_context)
         if found is None:
             self._locks[sig] = lock
         else:
@@ -120,11 +128,49 @@ class KernelCache(_Cache):
         return found
 
     def _may_be_kept(self, data: Any) -> bool:
+        if any(library.entry is None for library in data.library.needs):
+            return False
         if any(not code.can_cache for code in data.lifted) or data.library.has_dynamic_globals:
             text = f"kernel {self._kernel} holds addresses or large global arrays, so it cannot be kept"
             warnings.warn(text, NumbaWarning, stacklevel=2)
             return False
         return True
+
+
+_RESULTS: dict[str, Any] = {}
+
+
+def _load(entry: str, target_context: Any) -> Any:
+    """The compiled kernel of an entry, after those whose symbols it holds; None if one is not there."""
+    if entry not in _RESULTS:
+        for place in places():
+            payload = _read(place / entry) if usable(place) else None
+            if payload is not None:
+                with suppress(Exception):  # whatever is wrong with it, it can be compiled
+                    found = _result(payload, target_context)
+                    if found is not None:
+                        found.library.entry = entry
+                        _RESULTS[entry] = found
+                        break
+    return _RESULTS.get(entry)
+
+
+def _content(data: Any) -> bytes:
+    """What is kept of a compiled kernel."""
+    library: KernelLibrary = data.library
+    needed = [other.entry for other in library.needs]
+    return bytes(dumps((needed, library.symbols, *data._reduce())))
+
+
+def _result(payload: bytes, target_context: Any) -> Any:
+    """The compiled kernel of what was kept; None if one of those whose symbols it holds is not there."""
+    entries, symbols, stored, *rest = pickle.loads(payload)
+    needed = [_load(entry, target_context) for entry in entries]
+    if any(found is None for found in needed):
+        return None
+    libraries = [found.library for found in needed]
+    library = KernelLibrary.stored(target_context.codegen(), stored, symbols, libraries)
+    return rebuilt(target_context, library, tuple(rest))
 
 
 def _read(path: Path) -> bytes | None:

@@ -1,69 +1,41 @@
 """The decorator that makes a kernel of a function."""
 
-import inspect
-import warnings
 from collections.abc import Callable
-from typing import Any, TypeVar, cast, overload
+from functools import cache
+from typing import Any, TypeVar, cast
 
 import numba
 from numba import types
 from numba.core import cgutils
-from numba.core.errors import NumbaExperimentalFeatureWarning, TypingError
-from numba.core.typeinfer import register_dispatcher
+from numba.core.errors import TypingError
 from numba.extending import intrinsic, is_jitted
 from numba.extending import overload as overload_function
 
-from surgsim.compiled.cache import KernelCache
-from surgsim.compiled.watch import declare
-
-# Kernels are parameters of kernels: numba says so at every call with a tuple of them.
-warnings.filterwarnings("ignore", "First-class function type", NumbaExperimentalFeatureWarning)
+from surgsim.compiled.dispatcher import Kernel
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 
-@overload
-def compiled(function: Function, /) -> Function: ...
-@overload
-def compiled(*signatures: Any) -> Callable[[Function], Function]: ...
-def compiled(*given: Any) -> Any:
+def compiled(function: Function) -> Function:
     """Compile a function of arrays and numbers; IEEE arithmetic is kept as written, the GIL is released.
 
-    `@compiled` compiles at the first call, for the types that it is called with. `@compiled(SIGNATURE)`
-    compiles, or loads what is kept, when its module is imported, and takes no other types. Such a kernel can
-    be passed to another one as a parameter of the type `numba.types.FunctionType(SIGNATURE)`.
+    It is compiled at the first call, for the types that it is called with.
 
     Raises:
-        numba.core.errors.NumbaError: If the function does not compile for a signature.
-        TypeError: If what is decorated is no function.
+        numba.core.errors.NumbaError: At that call, if the function does not compile for these types.
     """
-    if len(given) == 1 and inspect.isfunction(given[0]):
-        return _kernel(given[0], ())
-    return lambda function: _kernel(function, given)
-
-
-def _kernel(function: Function, signatures: tuple[Any, ...]) -> Function:
-    made: Any = numba.njit(nogil=True, error_model="numpy")(function)
-    if not is_jitted(made):  # numba is told to leave Python functions alone
+    if vars(numba.config)["DISABLE_JIT"]:  # numba is told to leave Python functions alone
         return function
-    dispatcher: Any = made
-    dispatcher._cache = KernelCache(dispatcher)  # as `cache=True` would set numba's own
-    declare()
-    if signatures:
-        with register_dispatcher(dispatcher):
-            for signature in signatures:
-                dispatcher.compile(signature)
-        dispatcher.disable_compile()
-    return cast(Function, dispatcher)
+    return cast(Function, Kernel(function))
 
 
 def address_of(kernel: Any, signature: Any) -> int:
     """Where the `@compiled` function is, compiled for this signature: what `call_at` calls."""
-    parameter = as_parameter(kernel, signature)
-    if not is_jitted(parameter):
-        _IN_PYTHON[id(parameter)] = parameter
-        return id(parameter)
-    found: Any = parameter.get_compile_result(signature)
+    ours = _ours(kernel)
+    if ours is None:
+        _IN_PYTHON[id(kernel)] = kernel
+        return id(kernel)
+    found: Any = ours.within.for_signature(signature).get_compile_result(signature)
     address: int = found.library.get_pointer_to_function(found.fndesc.llvm_func_name)
     return address
 
@@ -105,18 +77,19 @@ def _call_at_in_kernels(address: Any, *values: Any) -> Any:
     return call
 
 
-_AS_PARAMETERS: dict[tuple[Any, Any], Any] = {}
-
-
 def as_parameter(kernel: Any, signature: Any) -> Any:
-    """The `@compiled` function as a parameter of the type `numba.types.FunctionType(signature)`.
+    """The `@compiled` function for this signature alone, for Python; it is compiled, or loaded, now."""
+    ours = _ours(kernel)
+    return kernel if ours is None else ours.for_signature(signature)
 
-    It is compiled for this signature, or loaded, when it is first asked for; `@compiled(SIGNATURE)` would do
-    so at import, when the number of joints is not yet known.
-    """
-    if not is_jitted(kernel):  # numba is told to leave Python functions alone
-        return kernel
-    key = (kernel.py_func, signature)
-    if key not in _AS_PARAMETERS:
-        _AS_PARAMETERS[key] = compiled(signature)(kernel.py_func)
-    return _AS_PARAMETERS[key]
+
+def _ours(kernel: Any) -> Kernel | None:
+    """The kernel, also of a function that numba itself was told to compile; None of a Python function."""
+    if isinstance(kernel, Kernel) or not is_jitted(kernel):
+        return kernel if isinstance(kernel, Kernel) else None
+    return _of_numba(cast(Any, kernel).py_func)
+
+
+@cache
+def _of_numba(function: Callable[..., Any]) -> Kernel:
+    return Kernel(function)

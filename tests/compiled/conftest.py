@@ -1,6 +1,7 @@
 """A folder of kernels of its own, and modules written for one test."""
 
 import importlib.util
+import subprocess
 import sys
 from pathlib import Path
 
@@ -26,6 +27,7 @@ class Workshop:
     def run(self, *names: str):
         """Import the modules as a new process would, and return the last one."""
         self.compiled.clear()
+        cache._RESULTS.clear()
         identity.file_hash.cache_clear()
         for name in names:
             sys.modules.pop(name, None)
@@ -36,8 +38,26 @@ class Workshop:
             exec(compile(source, spec.origin, "exec"), vars(module))  # no .pyc that hides an edit
         return module
 
+    def process(self, code: str, inlined: int) -> str:
+        """What another process prints that runs `code`, and inlines kernels of up to so many bytes."""
+        head = (
+            "import sys, pathlib; from surgsim.compiled import cache, library\n"
+            f"cache.places = lambda: (pathlib.Path({str(self.kept)!r}),)\n"
+            f"library.LARGEST_INLINED_BYTES = {inlined}\n"
+            f"sys.path.insert(0, {str(self._root)!r})\n"
+        )
+        done = subprocess.run(
+            [sys.executable, "-c", head + code], capture_output=True, text=True, timeout=120
+        )
+        assert done.returncode == 0, done.stderr
+        return done.stdout
+
     def entries(self) -> list[Path]:
-        """What is kept."""
+        """What is kept of kernels."""
+        return [path for path in self.files() if cache.ENTRANCE not in path.name]
+
+    def files(self) -> list[Path]:
+        """What is kept of kernels and of their entrances."""
         return sorted(self.kept.glob(f"*{cache.SUFFIX}"))
 
 
@@ -48,7 +68,7 @@ def workshop(tmp_path, monkeypatch):
     before = set(sys.modules)
 
     def told(compiling):
-        if compiling.ended:
+        if compiling.ended and not compiling.kernel.endswith(cache.ENTRANCE):
             made.compiled.append(compiling.kernel.rpartition(".")[2])
 
     with listening(told):

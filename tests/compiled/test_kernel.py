@@ -1,53 +1,11 @@
-"""`@compiled` and `@compiled(SIGNATURE)`."""
+"""`@compiled`, and what Python and kernels call."""
 
 from time import perf_counter
 
 import numpy as np
 import pytest
 
-from surgsim.compiled import address_of, watch
-
-SHAPES = "from typing import NamedTuple\nclass Seen(NamedTuple):\n    q: object\n    J: object\n"
-TYPED = """
-from numba import types
-from shapes import Seen
-from surgsim.compiled import compiled
-
-A = types.float64[::1]
-SEEN = types.NamedTuple((A, types.float64[:, ::1]), Seen)
-STEP = types.int64(SEEN, A)
-
-@compiled(STEP)
-def double(seen, out):
-    for i in range(seen.q.size):
-        out[i] = 2.0 * seen.q[i]
-    return 0
-
-@compiled(STEP)
-def halve(seen, out):
-    for i in range(seen.q.size):
-        out[i] = 0.5 * seen.J[i, 0]
-    return 1
-
-@compiled(types.int64(types.FunctionType(STEP), SEEN, A))
-def loop(step, seen, out):
-    return step(seen, out)
-"""
-
-
-def test_kernels_of_a_signature_compile_at_import_and_pass_as_parameters(workshop, tmp_path, monkeypatch):
-    monkeypatch.syspath_prepend(tmp_path)
-    workshop.write(shapes=SHAPES, user=TYPED)
-    for expected in (["double", "halve", "loop"], []):
-        module = workshop.run("user")
-        assert workshop.compiled == expected
-        seen, out = module.Seen(np.array([1.0, 2.0]), np.array([[4.0], [6.0]])), np.zeros(2)
-        assert module.loop(module.double, seen, out) == 0
-        assert out.tolist() == [2.0, 4.0]
-        assert module.loop(module.halve, seen, out) == 1
-        assert out.tolist() == [2.0, 3.0]
-        assert workshop.compiled == expected
-
+from surgsim.compiled import address_of, as_parameter, library, watch
 
 BY_ADDRESS = """
 from numba import types
@@ -87,18 +45,141 @@ def test_a_kernel_is_called_by_its_address(workshop):
     assert workshop.compiled == []
 
 
-def test_several_signatures_as_text_and_no_other_types(workshop):
-    head = "from surgsim.compiled import compiled\n"
+def test_a_kernel_of_one_signature_takes_no_other_types(workshop):
+    workshop.write(user=BY_ADDRESS)
+    module = workshop.run("user")
+    double = as_parameter(module.double, module.STEP)
+    x, out = np.array([1.0, 2.0]), np.zeros(2)
+    assert double(x, out) == 0
+    assert out.tolist() == [2.0, 4.0]
+    with pytest.raises(TypeError, match="No matching definition"):
+        double(x, 3)
+
+
+def test_a_function_that_numba_compiled_is_a_kernel_too(workshop):
     workshop.write(
-        user=head + "@compiled('float64(float64)', 'int64(int64)')\ndef twice(x):\n    return x + x\n"
+        user=BY_ADDRESS.replace("@compiled\ndef double", "@njit\ndef double").replace(
+            "types", "njit, types", 1
+        )
     )
     module = workshop.run("user")
-    assert workshop.compiled == ["twice", "twice"]
-    assert (module.twice(1.5), module.twice(2)) == (3.0, 4)
-    with pytest.raises(TypeError, match="No matching definition"):
-        module.twice("ab")
-    workshop.run("user")
+    x, out = np.array([1.0, 2.0]), np.zeros(2)
+    assert module.loop(address_of(module.double, module.STEP), x, out) == 0
+    assert out.tolist() == [2.0, 4.0]
+    assert as_parameter(module.double, module.STEP)(out, x) == 0
+    assert x.tolist() == [4.0, 8.0]
+
+
+PLAIN = """
+import numpy as np
+from surgsim.compiled import compiled
+
+@compiled
+def scale(a, by, out):
+    for i in range(a.size):
+        out[i] = by * a[i]
+
+@compiled
+def both(record, other):
+    scale(record.a, 2, record.b)
+    scale(record.b, 3, other)
+    scale(other, record.k, other)
+"""
+
+
+def test_one_compiled_kernel_serves_literals_numbers_fields_and_arrays(workshop):
+    workshop.write(user=PLAIN)
+    module = workshop.run("user")
+    record = np.recarray((), [("a", "f8", 2), ("b", "f8", 2), ("k", "i8")])
+    record.a, record.k, other = [1.0, 2.0], 5, np.zeros(2)
+    module.both(np.asarray(record)[()], other)
+    assert record.b.tolist() == [2.0, 4.0]
+    assert other.tolist() == [30.0, 60.0]
+    assert sorted(workshop.compiled) == ["both", "scale"]
+
+
+BRANCHES = "\n".join(
+    f"    if x > {k}: s += np.sin(s + {k}.0) * np.cos(x) / (1.0 + s * s)" for k in range(200)
+)
+LARGE = f"""
+import numpy as np
+from surgsim.compiled import compiled
+
+@compiled
+def large(x):
+    s = 0.0
+{BRANCHES}
+    return s
+
+@compiled
+def twice(x):
+    return 2.0 * large(x)
+
+@compiled
+def thrice(x):
+    return 3.0 * large(x)
+"""
+
+
+def test_a_large_kernel_is_called_by_name_and_loaded_with_its_callers(workshop):
+    workshop.write(user=LARGE)
+    module = workshop.run("user")
+    expected = 2.0 * module.large.py_func(30.5), 3.0 * module.large.py_func(30.5)
+    assert (module.twice(30.5), module.thrice(30.5)) == expected
+    for caller in (module.twice, module.thrice):
+        (result,) = caller.within.overloads.values()
+        (needed,) = result.library.needs
+        assert "large" in needed.entry
+        assert all("large" not in symbol for symbol in result.library.symbols)
+    module = workshop.run("user")
+    assert (module.twice(30.5), module.thrice(30.5)) == expected
     assert workshop.compiled == []
+
+
+def test_a_caller_is_compiled_again_where_what_it_calls_by_name_is_gone(workshop):
+    workshop.write(user=LARGE)
+    expected = workshop.run("user").twice(30.5)
+    (entry,) = [path for path in workshop.entries() if "large" in path.name]
+    entry.unlink()
+    assert workshop.run("user").twice(30.5) == expected
+    assert "large" in workshop.compiled
+    assert workshop.run("user").twice(30.5) == expected
+    assert workshop.compiled == []
+
+
+MAKER = """
+from surgsim.compiled import compiled
+
+def adding(number):
+    @compiled
+    def add(x):
+        return x + number
+    return add
+
+@compiled
+def one_more(x):
+    return one(x)
+
+@compiled
+def two_more(x):
+    return two(x)
+
+one, two = adding(1.0), adding(2.0)
+"""
+
+
+@pytest.mark.parametrize("inlined", [12_000, 0], ids=["inlined", "by name"])
+def test_functions_of_one_maker_that_different_processes_compiled_stay_apart(workshop, inlined, monkeypatch):
+    monkeypatch.setattr(library, "LARGEST_INLINED_BYTES", inlined)
+    workshop.write(user=MAKER)
+    for name, expected in (("one_more", 11.0), ("two_more", 12.0)):  # each first in its process
+        out = workshop.process(f"import user; print(user.{name}(10.0))", inlined)
+        assert float(out) == expected
+    module = workshop.run("user")
+    assert (module.one_more(10.0), module.two_more(10.0)) == (11.0, 12.0)
+    assert (module.one(10.0), module.two(10.0)) == (11.0, 12.0)
+    assert "one_more" not in workshop.compiled
+    assert "two_more" not in workshop.compiled
 
 
 def test_clocks_of_a_run_leave_out_what_compiling_took(workshop):

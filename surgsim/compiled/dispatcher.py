@@ -1,0 +1,115 @@
+"""A kernel in its two forms: as Python calls it, and as other kernels do."""
+
+import inspect
+from collections.abc import Callable
+from functools import update_wrapper
+from typing import Any
+
+from numba import types
+from numba.core.imputils import lower_cast
+from numba.core.registry import CPUDispatcher
+from numba.core.typeinfer import register_dispatcher
+
+from surgsim.compiled.cache import KernelCache
+from surgsim.compiled.library import KernelCompiler
+from surgsim.compiled.watch import declare
+
+_OPTIONS = {"nopython": True, "nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
+
+
+class _Form(CPUDispatcher):
+    """What both forms are: kept on disk, and to be had for one signature alone."""
+
+    def __init__(self, function: Callable[..., Any], compiled: Callable[..., Any], **options: bool) -> None:
+        super().__init__(compiled, {}, {**_OPTIONS, **options}, KernelCompiler)
+        self.py_func = function
+        self._cache = KernelCache(self, compiled)
+        self._of_signature: dict[Any, _Form] = {}
+
+    def for_signature(self, signature: Any) -> "_Form":
+        """The kernel compiled for `signature`, which takes no other types and returns its type."""
+        if signature not in self._of_signature:
+            made = self._again()
+            with register_dispatcher(made):
+                made.compile(signature)
+            made.disable_compile()
+            self._of_signature[signature] = made
+        return self._of_signature[signature]
+
+    def _again(self) -> "_Form":
+        """The same, with nothing compiled."""
+        raise NotImplementedError
+
+
+class Within(_Form):
+    """A kernel as kernels call it: without the code that takes Python's objects apart.
+
+    It is compiled for plain types: a literal number is a number, and an array that is a record's field is an
+    array, so that one compiled kernel serves them all.
+    """
+
+    def __init__(self, function: Callable[..., Any]) -> None:
+        super().__init__(function, function, no_cpython_wrapper=True)
+
+    def get_call_template(self, args: Any, kws: Any) -> Any:
+        """The template of a call, for plain types."""
+        plain = {name: _plain(kind) for name, kind in kws.items()}
+        return super().get_call_template([_plain(kind) for kind in args], plain)
+
+    def for_signature(self, signature: Any) -> _Form:
+        """The kernel compiled for `signature`: this one, if that is what it returns anyhow."""
+        self.compile(signature.args)
+        found: Any = self.overloads[signature.args]
+        same = found.signature.return_type == signature.return_type
+        return self if same else super().for_signature(signature)
+
+    def _again(self) -> "Within":
+        return Within(self.py_func)
+
+
+class Kernel(_Form):
+    """A compiled function as Python calls it: an entrance to the form `within`, which kernels call."""
+
+    def __init__(self, function: Callable[..., Any], within: Within | None = None) -> None:
+        self.within = within or Within(function)
+        super().__init__(function, _entrance(self.within))
+        if within is None:
+            declare()
+
+    def get_call_template(self, args: Any, kws: Any) -> Any:
+        """The template of a call from another kernel."""
+        return self.within.get_call_template(args, kws)
+
+    def get_overload(self, sig: Any) -> Any:
+        """What another kernel calls."""
+        return self.within.get_overload(sig)
+
+    @property
+    def nopython_signatures(self) -> Any:
+        """Signatures that other kernels call."""
+        return self.within.nopython_signatures
+
+    def _again(self) -> "Kernel":
+        return Kernel(self.py_func, self.within)
+
+
+def _entrance(within: Within) -> Callable[..., Any]:
+    """A function of the same parameters that calls the kernel."""
+    function = within.py_func
+    names = ", ".join(inspect.signature(function).parameters)
+    made: dict[str, Any] = {}
+    exec(f"def entrance({names}): return within({names})", {"within": within}, made)
+    entrance: Callable[..., Any] = update_wrapper(made["entrance"], function)
+    entrance.__defaults__ = function.__defaults__
+    return entrance
+
+
+def _plain(kind: Any) -> Any:
+    if isinstance(kind, types.NestedArray):
+        return types.Array(kind.dtype, kind.ndim, "C")
+    return types.unliteral(kind)
+
+
+@lower_cast(types.NestedArray, types.Array)  # type: ignore[untyped-decorator]
+def _nested_is_an_array(context: Any, builder: Any, fromty: Any, toty: Any, value: Any) -> Any:
+    return value
