@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from surgsim.columns import width
 from surgsim.contract.check import Check, require
 from surgsim.contract.problems import DT
 from surgsim.tasks.base import Feedback
@@ -47,8 +48,8 @@ def commands(config: Any) -> None:
         require(np.array_equal(again, forward), "commands differ if they are asked for in another order")
         require(np.ptp(forward[:, 0], axis=0).max() > 1e-4, "the tip is never asked to move")
     first = _in_turn(task)
-    width = 9 + sum(len(block.columns) for block in task.columns)
-    require(first.shape == (_TICKS, width), f"rows have {first.shape[1]} values, the columns ask for {width}")
+    asked = 9 + width(task.columns)
+    require(first.shape == (_TICKS, asked), f"rows have {first.shape[1]} values, the columns ask for {asked}")
     require(np.isfinite(first[:, :9]).all(), "a command is not finite")
     require(
         np.array_equal(_in_turn(task), first, equal_nan=True), "after a reset the task says something else"

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from pydantic import PositiveFloat
 
 from surgsim.catalog import Name, PartConfig, Surroundings
-from surgsim.columns import Block, vector
+from surgsim.columns import Block, vector, width
 from surgsim.compiled import as_parameter
 from surgsim.control.binding import ControllerParts, bind, new_control
 from surgsim.control.decision import decide, decide_signature, forget
@@ -202,7 +202,7 @@ class Controller:
 
     def _output(self) -> ControlOutput:
         c, out = self.control, self.control.resolved
-        own = out.values[: sum(len(block.columns) for block in self.parts.columns)].copy()
+        own = out.values[: width(self.parts.columns)].copy()
         resolution = Resolution(
             qdot=out.qdot.copy(), residual=float(out.residual), command=command_of(c.seen), values=own
         )

@@ -5,7 +5,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surgsim.models.build import build
-from surgsim.plant.bystanders import joint_columns
+from surgsim.plant.other_joints import joint_columns
 from surgsim.plant.truth import Truth
 from surgsim.simulate.setup import Setup
 

@@ -158,3 +158,15 @@ def _ids(values: list[int]) -> Ids:
     ids = np.array(values, dtype=np.intp)
     ids.flags.writeable = False
     return ids
+
+
+def span(ids: NDArray[np.intp]) -> slice:
+    """Ids that follow each other, as a slice: MuJoCo's arrays are then seen without a copy.
+
+    Raises:
+        ValueError: If they do not.
+    """
+    first = int(ids[0])
+    if not np.array_equal(ids, np.arange(first, first + len(ids))):
+        raise ValueError(f"the ids {ids} do not follow each other")
+    return slice(first, first + len(ids))

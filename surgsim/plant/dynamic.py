@@ -10,21 +10,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surgsim.catalog import PartConfig
-from surgsim.columns import Block, scalar
+from surgsim.columns import Block, scalar, width
 from surgsim.columns import vector as vector_columns
 from surgsim.compiled import address_of, as_parameter, compiled
 from surgsim.errors import SurgsimError
 from surgsim.models.build import Scene
 from surgsim.plant.base import Plant
 from surgsim.plant.bore import Bore, act, drag, wall_force
-from surgsim.plant.bystanders import joint_columns
 from surgsim.plant.contacts import ContactWatch
 from surgsim.plant.ledger import EnergyLedger, after_step, before_step, fill_terms
+from surgsim.plant.other_joints import joint_columns
 from surgsim.plant.part import BLOCK_TICKS, PlantPart
-from surgsim.plant.port import Port
+from surgsim.plant.port import forget, new_bore
 from surgsim.plant.records import world_of
 from surgsim.plant.state import State
-from surgsim.plant.truth import NOWHERE, PointReader, Truth
+from surgsim.plant.truth import NOWHERE, Truth
 from surgsim.plant.world import (
     ACTUATE,
     AFTER_STEP,
@@ -237,19 +237,17 @@ class DynamicPlant:
         self.world = world_of(
             scene, self._data, control_period_s, disturbed=bool(parts) or has_wall, touched=self._touched
         )
-        self._port = Port(scene, self._data, self.world)
-        self.bore = self._port.bore
+        self.bore = new_bore(scene)
         signature = advance_signature(len(scene.dof_ids))
         self._begin, self._look = as_parameter(begin, signature), as_parameter(look, signature)
         self._advance = as_parameter(advance_dynamics, signature)
         self.advance = address_of(advance_dynamics, signature)
-        self._ledger = EnergyLedger(scene, self._data, self._port) if energy_ledger else None
+        self._ledger = EnergyLedger(scene, self._data, self.bore) if energy_ledger else None
         for part in self._parts:
             part.attach(scene, control_period_s)
         self._drawn_at = np.full(1, -1.0)
         self._joint_columns, places = joint_columns(scene.model)
         self._table = self._hooks(places)
-        self._points = PointReader(scene, self._data)
         self._contacts = ContactWatch(scene, self._data)
 
     @property
@@ -310,8 +308,7 @@ class DynamicPlant:
             kernels = {BEFORE_STEP: before_step, AFTER_STEP: after_step, VALUES: fill_terms}
             hooks += [Hook(kind=kind, part=1, rank=0, kernel=kernel) for kind, kernel in kernels.items()]
         for number, part in enumerate(self._parts, _FIRST_PART):
-            width = sum(len(block.columns) for block in part.columns) if _records(part) else 0
-            shares.append((part, width))
+            shares.append((part, width(part.columns) if _records(part) else 0))
             hooks += self._hooks_of(part, number)
         return HookTable(hooks, shares, len(self._scene.dof_ids), self.world)
 
@@ -341,7 +338,7 @@ class DynamicPlant:
         self._start_parts()
         self._drawn_at[:] = -1.0
         self.refill()
-        self._port.reset()
+        forget(self.bore)
         self._told(self._begin(world, self.bore, self._table.record))
         return self.state()
 
@@ -390,17 +387,16 @@ class DynamicPlant:
 
     def truth(self) -> Truth:
         """Where things really are now."""
-        p_WT, p_WR, p_WC = self._points.read()
         world = self.world
         return Truth(
             q=world.q.copy(),
             v=world.v.copy(),
-            p_WT=p_WT,
-            p_WR=p_WR,
-            p_WC=p_WC,
+            p_WT=world.p_WT.copy(),
+            p_WR=world.p_WR.copy(),
+            p_WC=world.p_WC.copy(),
             f_C=world.f_C.copy() if self._scene.wall is not None else NOWHERE,
             f_T=world.f_T.copy() if self._touched else NOWHERE,
-            contact=self._contacts.look(p_WC),
+            contact=self._contacts.look(world.p_WC),
             values=self._table.values.copy(),
         )
 

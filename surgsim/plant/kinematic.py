@@ -18,7 +18,7 @@ from surgsim.plant.dynamic import see_arm
 from surgsim.plant.part import PlantPart
 from surgsim.plant.records import world_of
 from surgsim.plant.state import State
-from surgsim.plant.truth import PointReader, Truth
+from surgsim.plant.truth import Truth
 from surgsim.plant.world import Hooks, HookTable, advance_signature, measured
 from surgsim.tick.arrays import World, new
 from surgsim.tick.mujoco_calls import mj_kinematics
@@ -84,7 +84,6 @@ class KinematicPlant:
         self.hooks = HookTable((), (), n, self.world)
         self._advance = as_parameter(advance_kinematics, advance_signature(n))
         self.advance = address_of(advance_kinematics, advance_signature(n))
-        self._points = PointReader(scene, self._data)
         self.watch = ContactWatch(scene, self._data)
 
     @property
@@ -125,8 +124,12 @@ class KinematicPlant:
 
     def truth(self) -> Truth:
         """Where things are now."""
-        p_WT, p_WR, p_WC = self._points.read()
-        contact = self.watch.look(p_WC)
+        world = self.world
         return Truth(
-            q=self.world.q.copy(), v=self.world.v.copy(), p_WT=p_WT, p_WR=p_WR, p_WC=p_WC, contact=contact
+            q=world.q.copy(),
+            v=world.v.copy(),
+            p_WT=world.p_WT.copy(),
+            p_WR=world.p_WR.copy(),
+            p_WC=world.p_WC.copy(),
+            contact=self.watch.look(world.p_WC),
         )

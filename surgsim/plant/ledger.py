@@ -23,7 +23,7 @@ import numpy as np
 
 from surgsim.compiled import compiled
 from surgsim.models.build import Scene
-from surgsim.plant.port import Port
+from surgsim.plant.bore import Bore
 from surgsim.tick.arrays import Array, Record, World
 from surgsim.tick.mujoco_calls import mj_mulM
 from surgsim.tick.overlay import laid_over, overlay
@@ -293,7 +293,7 @@ class EnergyLedger:
     Args:
         scene: The compiled scene.
         data: Its data.
-        port: The port that acts in it; without it the bore's forces and the wall's motion are `applied_work`.
+        bore: The port that acts in it; without it the bore's forces and the wall's motion are `applied_work`.
 
     Attributes:
         gains: Its numbers.
@@ -313,7 +313,7 @@ class EnergyLedger:
         "residual",
     )
 
-    def __init__(self, scene: Scene, data: mujoco.MjData, port: Port | None = None) -> None:
+    def __init__(self, scene: Scene, data: mujoco.MjData, bore: Bore | None = None) -> None:
         model = scene.model
         self._model, self._data, self._friction = model, data, np.zeros(model.nv)
         self._entered = PythonPart(self._find_friction)
@@ -332,9 +332,9 @@ class EnergyLedger:
         law.friction, law.entry[:] = self._friction.ctypes.data, self._entered.gains
         law.rubs, law.springs = bool(np.any(model.dof_frictionloss)), len(springs)
         law.h = model.opt.timestep
-        if port is None or port.wall is None:
+        if bore is None or scene.wall is None:
             return
-        bore, law.walled, law.cannula = port.bore, 1, port.bore.first_dof
+        law.walled, law.cannula = 1, bore.first_dof
         for name in ("contact_arm", "contact_cannula", "seal_arm", "seal_cannula", "stored"):
             law[name] = getattr(bore.acting, name).ctypes.data
         for name in ("drive", "offset", "velocity"):

@@ -1,32 +1,12 @@
 """The record of a plant whose physics are MuJoCo's."""
 
-from typing import Any
-
 import mujoco
 import numpy as np
 
-from surgsim.models.build import Scene
+from surgsim.models.build import Scene, span
 from surgsim.tick.arrays import World, new
 
-_ARRAYS = (
-    "xaxis",
-    "xanchor",
-    "qpos",
-    "qvel",
-    "ctrl",
-    "qfrc_bias",
-    "qfrc_applied",
-    "xfrc_applied",
-    "xpos",
-    "xquat",
-    "xmat",
-    "xipos",
-    "site_xpos",
-    "site_xmat",
-    "cfrc_ext",
-    "mocap_pos",
-    "sensordata",
-)
+_ARRAYS = sorted(World.ADDRESSES - {"mj_model", "mj_data"})
 
 
 def world_of(
@@ -45,8 +25,9 @@ def world_of(
         setattr(world, name, getattr(data, name).ctypes.data)
     world.nq, world.nv, world.nbody = model.nq, model.nv, model.nbody
     world.nsite, world.njnt = model.nsite, model.njnt
-    world.first_qpos, world.first_dof = _first(scene.qpos_ids), _first(scene.dof_ids)
-    world.first_ctrl, world.first_joint = _first(scene.actuator_ids), int(model.dof_jntid[scene.dof_ids[0]])
+    world.first_qpos, world.first_dof = span(scene.qpos_ids).start, span(scene.dof_ids).start
+    world.first_ctrl = span(scene.actuator_ids).start
+    world.first_joint = int(model.dof_jntid[scene.dof_ids[0]])
     world.tip, world.entry = scene.tip_site, scene.shaft_entry_site
     world.trocar = -1 if scene.trocar_site is None else scene.trocar_site
     world.mocap = -1 if scene.port_mocap is None else scene.port_mocap
@@ -59,11 +40,3 @@ def world_of(
     if world.mocap >= 0:
         world.port_home[:] = data.mocap_pos[world.mocap]
     return world
-
-
-def _first(ids: Any) -> int:
-    """Where the arm's entries begin; they follow each other."""
-    first = int(ids[0])
-    if not np.array_equal(ids, np.arange(first, first + len(ids))):
-        raise ValueError(f"the arm's entries {ids} do not follow each other")
-    return first

@@ -2,11 +2,8 @@
 
 from dataclasses import dataclass, field
 
-import mujoco
 import numpy as np
 from numpy.typing import NDArray
-
-from surgsim.models.build import Scene
 
 Array = NDArray[np.float64]
 NOWHERE = np.full(3, np.nan)
@@ -53,26 +50,3 @@ class Truth:
     f_T: Array = field(default_factory=lambda: NOWHERE)
     contact: Contact | None = None
     values: Array = field(default_factory=lambda: NO_VALUES)
-
-
-def arm_view(values: Array, ids: NDArray[np.intp]) -> Array:
-    """The arm's part of one of MuJoCo's vectors, not copied; its n entries follow each other."""
-    first = int(ids[0])
-    if not np.array_equal(ids, np.arange(first, first + len(ids))):
-        raise ValueError(f"the arm's entries {ids} do not follow each other")
-    return values[first : first + len(ids)]
-
-
-class PointReader:
-    """Copies tip, wrist and trocar out of MuJoCo's data."""
-
-    def __init__(self, scene: Scene, data: mujoco.MjData) -> None:
-        self._points = data.site_xpos
-        self._has_trocar = scene.trocar_site is not None
-        trocar = scene.tip_site if scene.trocar_site is None else scene.trocar_site
-        self._sites = np.array([scene.tip_site, scene.shaft_entry_site, trocar])
-
-    def read(self) -> tuple[Array, Array, Array]:
-        """Tip, wrist and trocar, each (3,) [m], as they are now."""
-        p_WT, p_WR, p_WC = self._points[self._sites]
-        return p_WT, p_WR, p_WC if self._has_trocar else NOWHERE

@@ -8,7 +8,7 @@ import numpy as np
 import rerun as rr
 
 from surgsim.models.build import Scene, build
-from surgsim.plant.bystanders import joint_columns
+from surgsim.plant.other_joints import joint_columns
 from surgsim.recording import palette
 from surgsim.recording.layout import SCENE, TIMELINE, timestamps
 from surgsim.recording.shapes import Triangles, geom_triangles, joined

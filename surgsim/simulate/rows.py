@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from surgsim.columns import Block
+from surgsim.columns import Block, width
 from surgsim.compiled import as_parameter
 from surgsim.models.arm import ArmModel
 from surgsim.simulate.derived import DERIVED_BLOCKS, derive, derive_signature
@@ -32,17 +32,17 @@ class Rows:
     def __init__(self, base: Group, groups: dict[str, Group], rows: int, arm: ArmModel) -> None:
         self._blocks = (*base, *(block for group in groups.values() for block in group))
         self.at: dict[str, slice] = {}
-        width = 0
+        end = 0
         for block in self._blocks:
-            self.at[block.name] = slice(width, width + len(block.columns))
-            width += len(block.columns)
+            self.at[block.name] = slice(end, end + len(block.columns))
+            end += len(block.columns)
         self.group: dict[str, slice] = {}
-        first = sum(len(block.columns) for block in base)
+        first = width(base)
         for name, group in groups.items():
-            last = first + sum(len(block.columns) for block in group)
+            last = first + width(group)
             self.group[name] = slice(first, last)
             first = last
-        self.data = np.full((rows, width), np.nan)
+        self.data = np.full((rows, end), np.nan)
         n = arm.limits.q_min.size
         self._model = new(Model, n)
         arm.point(self._model)

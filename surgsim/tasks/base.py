@@ -14,10 +14,13 @@ from surgsim.columns import Block
 from surgsim.compiled import compiled
 from surgsim.models.config import TrocarConfig, Vec3
 from surgsim.spatial import plane_axes
-from surgsim.tasks.profile import Profile
+from surgsim.tasks.profile import Profile, progress
 from surgsim.tasks.success import RunColumns, Success, path_success
+from surgsim.tick import arrays
 from surgsim.tick.arrays import Command
 from surgsim.tick.blank import new_command, new_feedback
+from surgsim.tick.scratch import scratch_matrix
+from surgsim.tick.status import GOES_ON
 
 Array = NDArray[np.float64]
 _REACH_SAMPLES = 200
@@ -243,15 +246,8 @@ class PathTaskConfig(PartConfig, ABC):
 
     @property
     @abstractmethod
-    def path(self) -> tuple[Any, tuple[float, ...]]:
-        """The kernel of the path and its numbers; see `PathKernel`."""
-
-    def shape(self, s: float) -> Array:
-        """Rows point [m], first and second derivative by s (3, 3), in path axes, from the origin at s = 0."""
-        kernel, numbers = self.path
-        rows = np.zeros((3, 3))
-        kernel(np.array(numbers), float(s), rows)
-        return rows
+    def numbers(self) -> tuple[float, ...]:
+        """The numbers of the path."""
 
     def build(
         self, start: Array, period_s: float = 0.001, seed: np.random.SeedSequence | None = None
@@ -271,6 +267,7 @@ class PathTaskConfig(PartConfig, ABC):
         return path_success(run)
 
 
+TaskKernel = Callable[[Array, arrays.Feedback, Array, Command], int]
 PathKernel = Callable[[Array, float, Array], None]
 """path(numbers, s, rows): fills point [m] and first and second derivative by s (3, 3), from the origin."""
 HOLD, DURATION, RAMP, START, ROTATION, NUMBERS = 0, 1, 2, 3, 6, 15
@@ -292,6 +289,20 @@ def follow(gains: Array, rows: Array, s_dot: float, s_ddot: float, out: Command)
         out.a_WTd[i] = ddp * (s_dot * s_dot) + dp * s_ddot
 
 
+def following(path: PathKernel) -> TaskKernel:
+    """The kernel of a task that follows `path` with the profile's progress."""
+
+    @compiled
+    def kernel(gains: Array, feedback: arrays.Feedback, memory: Array, out: Command) -> int:
+        s, s_dot, s_ddot = progress(gains[HOLD], gains[DURATION], gains[RAMP], feedback.t_s)
+        rows = scratch_matrix(3, 3)
+        path(gains[NUMBERS:], s, rows)
+        follow(gains, rows, s_dot, s_ddot, out)
+        return GOES_ON
+
+    return kernel
+
+
 class PathTask(TimedTask):
     """A path followed with a smooth profile; its law is a kernel of the path's own file.
 
@@ -304,7 +315,7 @@ class PathTask(TimedTask):
         self._profile = profile
         self.kernel = shape.kernel
         times = (profile.hold_start_s, profile.duration_s, profile.ramp_s)
-        self.gains = np.array([*times, *start, *R_WP.T.ravel(), *shape.path[1]])
+        self.gains = np.array([*times, *start, *R_WP.T.ravel(), *shape.numbers])
         self._out = new_command()
         self._feedback = new_feedback()
 

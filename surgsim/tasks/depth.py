@@ -6,11 +6,7 @@ from typing import Any, ClassVar, Literal
 from pydantic import NonNegativeFloat, PositiveFloat
 
 from surgsim.compiled import compiled
-from surgsim.tasks.base import DURATION, HOLD, NUMBERS, RAMP, Array, PathTaskConfig, Turns, follow
-from surgsim.tasks.profile import progress
-from surgsim.tick.arrays import Command, Feedback
-from surgsim.tick.scratch import scratch_matrix
-from surgsim.tick.status import GOES_ON
+from surgsim.tasks.base import Array, PathTaskConfig, Turns, following
 
 
 @compiled
@@ -24,16 +20,6 @@ def depth_path(numbers: Array, s: float, rows: Array) -> None:
     rows[2, 0], rows[2, 1], rows[2, 2] = -w * w * c, -w * w * n, u * u * d
 
 
-@compiled
-def depth(gains: Array, feedback: Feedback, memory: Array, out: Command) -> int:
-    """The path followed with the profile's progress."""
-    s, s_dot, s_ddot = progress(gains[HOLD], gains[DURATION], gains[RAMP], feedback.t_s)
-    rows = scratch_matrix(3, 3)
-    depth_path(gains[NUMBERS:], s, rows)
-    follow(gains, rows, s_dot, s_ddot, out)
-    return GOES_ON
-
-
 class DepthConfig(PathTaskConfig):
     """Strokes along the path's z axis (`normal`) over a circle in its plane: a varying insertion depth.
 
@@ -42,7 +28,7 @@ class DepthConfig(PathTaskConfig):
     tip. Dimensions are assumed.
     """
 
-    kernel: ClassVar[Any] = staticmethod(depth)
+    kernel: ClassVar[Any] = staticmethod(following(depth_path))
 
     type: Literal["depth"] = "depth"
     radius_m: NonNegativeFloat = 0.01
@@ -51,6 +37,6 @@ class DepthConfig(PathTaskConfig):
     strokes: Turns = 2.0
 
     @property
-    def path(self) -> tuple[Any, tuple[float, ...]]:
-        """The kernel of the path and its numbers."""
-        return depth_path, (self.radius_m, self.turns, self.depth_m, self.strokes)
+    def numbers(self) -> tuple[float, ...]:
+        """The numbers of the path."""
+        return (self.radius_m, self.turns, self.depth_m, self.strokes)

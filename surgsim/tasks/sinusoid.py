@@ -6,11 +6,7 @@ from typing import Any, ClassVar, Literal
 from pydantic import PositiveFloat
 
 from surgsim.compiled import compiled
-from surgsim.tasks.base import DURATION, HOLD, NUMBERS, RAMP, Array, PathTaskConfig, Turns, follow
-from surgsim.tasks.profile import progress
-from surgsim.tick.arrays import Command, Feedback
-from surgsim.tick.scratch import scratch_matrix
-from surgsim.tick.status import GOES_ON
+from surgsim.tasks.base import Array, PathTaskConfig, Turns, following
 
 
 @compiled
@@ -24,16 +20,6 @@ def sinusoid_path(numbers: Array, s: float, rows: Array) -> None:
     rows[2, 1] = -w * w * n
 
 
-@compiled
-def sinusoid(gains: Array, feedback: Feedback, memory: Array, out: Command) -> int:
-    """The path followed with the profile's progress."""
-    s, s_dot, s_ddot = progress(gains[HOLD], gains[DURATION], gains[RAMP], feedback.t_s)
-    rows = scratch_matrix(3, 3)
-    sinusoid_path(gains[NUMBERS:], s, rows)
-    follow(gains, rows, s_dot, s_ddot, out)
-    return GOES_ON
-
-
 class SinusoidConfig(PathTaskConfig):
     """Sine wave along the path's x axis with its amplitude along y.
 
@@ -41,7 +27,7 @@ class SinusoidConfig(PathTaskConfig):
     number of periods is not given there.
     """
 
-    kernel: ClassVar[Any] = staticmethod(sinusoid)
+    kernel: ClassVar[Any] = staticmethod(following(sinusoid_path))
 
     type: Literal["sinusoid"] = "sinusoid"
     amplitude_m: PositiveFloat = 0.01
@@ -49,6 +35,6 @@ class SinusoidConfig(PathTaskConfig):
     periods: Turns = 2.0
 
     @property
-    def path(self) -> tuple[Any, tuple[float, ...]]:
-        """The kernel of the path and its numbers."""
-        return sinusoid_path, (self.amplitude_m, self.length_m, self.periods)
+    def numbers(self) -> tuple[float, ...]:
+        """The numbers of the path."""
+        return (self.amplitude_m, self.length_m, self.periods)

@@ -6,11 +6,7 @@ from typing import Any, ClassVar, Literal
 from pydantic import PositiveFloat
 
 from surgsim.compiled import compiled
-from surgsim.tasks.base import DURATION, HOLD, NUMBERS, RAMP, Array, PathTaskConfig, Turns, follow
-from surgsim.tasks.profile import progress
-from surgsim.tick.arrays import Command, Feedback
-from surgsim.tick.scratch import scratch_matrix
-from surgsim.tick.status import GOES_ON
+from surgsim.tasks.base import Array, PathTaskConfig, Turns, following
 
 
 @compiled
@@ -24,16 +20,6 @@ def spiral_path(numbers: Array, s: float, rows: Array) -> None:
     rows[2, 0], rows[2, 1] = -w * w * c, -w * w * n
 
 
-@compiled
-def spiral(gains: Array, feedback: Feedback, memory: Array, out: Command) -> int:
-    """The path followed with the profile's progress."""
-    s, s_dot, s_ddot = progress(gains[HOLD], gains[DURATION], gains[RAMP], feedback.t_s)
-    rows = scratch_matrix(3, 3)
-    spiral_path(gains[NUMBERS:], s, rows)
-    follow(gains, rows, s_dot, s_ddot, out)
-    return GOES_ON
-
-
 class SpiralConfig(PathTaskConfig):
     """Helix that advances along the path's z axis (`normal`).
 
@@ -41,7 +27,7 @@ class SpiralConfig(PathTaskConfig):
     manipulability paper; the number of turns is not given there.
     """
 
-    kernel: ClassVar[Any] = staticmethod(spiral)
+    kernel: ClassVar[Any] = staticmethod(following(spiral_path))
 
     type: Literal["spiral"] = "spiral"
     radius_m: PositiveFloat = 0.01
@@ -49,6 +35,6 @@ class SpiralConfig(PathTaskConfig):
     turns: Turns = 6.0
 
     @property
-    def path(self) -> tuple[Any, tuple[float, ...]]:
-        """The kernel of the path and its numbers."""
-        return spiral_path, (self.radius_m, self.length_m, self.turns)
+    def numbers(self) -> tuple[float, ...]:
+        """The numbers of the path."""
+        return (self.radius_m, self.length_m, self.turns)

@@ -7,10 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, NonNegativeFloat, model_validator
 
-from surgsim.models.build import Scene
+from surgsim.models.build import Scene, span
 from surgsim.models.robot import joint_names
 from surgsim.plant.disturbances.base import Disturbance, DisturbanceConfig, Spread, copied, spread_factor
-from surgsim.plant.truth import arm_view
 
 Array = NDArray[np.float64]
 
@@ -114,7 +113,7 @@ class StribeckFriction(Disturbance):
         if not np.array_equal(with_friction[first : first + n], scene.dof_ids):
             raise ValueError("the arm's joints have no friction constraint each")
         self._rows = slice(first, first + n)
-        self._qvel = arm_view(data.qvel, scene.dof_ids)
+        self._qvel = data.qvel[span(scene.dof_ids)]
 
     def push(self, t_s: float, scene: Scene, data: mujoco.MjData) -> None:
         """Add F(v) - F_c to the bounds that `mj_step1` has set."""

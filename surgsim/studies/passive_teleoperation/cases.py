@@ -8,7 +8,7 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
-from surgsim.columns import scalar
+from surgsim.columns import scalar, width
 from surgsim.control.resolvers.base import KernelResolver
 from surgsim.control.resolvers.passive_qp import PassiveQpConfig
 from surgsim.models.arm import ArmModel
@@ -172,7 +172,7 @@ class TimedQpConfig(PassiveQpConfig):
     def build(self, arm: ArmModel) -> KernelResolver:
         """The resolver, its kernel called from Python."""
         inner = super().build(arm)
-        last = sum(len(block.columns) for block in inner.columns)
+        last = width(inner.columns)
 
         def kernel(gains: Array, seen: Seen, memory: Array, out: Resolved) -> int:
             began = thread_time()

@@ -6,11 +6,11 @@ from dataclasses import dataclass, field
 import mujoco
 import numpy as np
 import pytest
+from port_alone import Port
 
 from surgsim.models.build import Scene, build, build_arm
 from surgsim.models.config import RobotConfig, SceneConfig, TrocarConfig, WallConfig
 from surgsim.plant.ledger import EnergyLedger, after_step, before_step, fill_terms
-from surgsim.plant.port import Port
 from surgsim.plant.records import world_of
 
 Q = np.array([1.6, -0.4, 0.2, 1.5, 0.1, -1.0, 0.3])
@@ -21,7 +21,7 @@ class Books:
     """An energy ledger outside a plant: its kernels on arrays of its own."""
 
     def __init__(self, scene: Scene, data: mujoco.MjData, port: Port | None = None) -> None:
-        self.ledger = EnergyLedger(scene, data, port)
+        self.ledger = EnergyLedger(scene, data, None if port is None else port.bore)
         self.world = world_of(scene, data, float(scene.model.opt.timestep))
         self.values = np.zeros(len(EnergyLedger.COLUMNS))
 

@@ -3,9 +3,9 @@
 import mujoco
 import numpy as np
 import pytest
+from port_alone import Port
 
 from surgsim.plant.ledger import EnergyLedger
-from surgsim.plant.port import Port
 
 
 def _moving(rig, timestep_s, **options):

@@ -86,9 +86,7 @@ def test_force_reads_and_changes_nothing(rig):
     np.testing.assert_array_equal(made.port.force(), before)
     np.testing.assert_array_equal(made.data.qfrc_applied, applied)
     made.port.act()
-    inside = (
-        made.port.wall.contact[made.scene.cannula_dof_ids] + made.port.wall.seal[made.scene.cannula_dof_ids]
-    )
+    inside = made.port.bore.acting.contact_cannula + made.port.bore.acting.seal_cannula
     np.testing.assert_allclose(made.axes() @ inside, before, atol=1e-12)
 
 
@@ -135,7 +133,7 @@ def test_the_seal_s_friction_turns_with_the_motion(rig):
     made.stiffness, made.damping = 50.0, 2.0
     made.push = lambda t: axis * 8.0 * np.sin(2 * np.pi * t)
     seen = np.array(
-        made.run(3.0, lambda: (made.shaft()[1], made.term("friction_loss"), made.port.wall.stored[1]))
+        made.run(3.0, lambda: (made.shaft()[1], made.term("friction_loss"), made.port.bore.acting.stored[1]))
     )
     way, loss, stored = np.abs(np.diff(seen[:, 0])).sum(), seen[:, 1], seen[:, 2]
     assert way > 0.02
@@ -163,7 +161,7 @@ def test_a_shaft_outside_is_not_touched(rig, lateral_m):
     made = _above(rig, lateral_m)
     made.port.act()
     np.testing.assert_array_equal(made.port.force(), 0.0)
-    assert not made.port.wall.engaged
+    assert not made.port.engaged
 
 
 def _insert(made, way_m=0.03, seconds=1.0):
@@ -187,7 +185,7 @@ def _insert(made, way_m=0.03, seconds=1.0):
 def test_a_slightly_misaligned_tip_finds_its_way_in(rig):
     made = _above(rig, 0.0025)
     forces = _insert(made)
-    assert made.port.wall.engaged
+    assert made.port.engaged
     assert forces.max() > 0.5  # the funnel pushed
     away, _ = made.shaft()
     assert CLEARANCE_M < np.linalg.norm(away) < CLEARANCE_M + 0.002
@@ -197,5 +195,5 @@ def test_a_slightly_misaligned_tip_finds_its_way_in(rig):
 def test_a_tip_beside_the_mouth_stays_outside(rig):
     made = _above(rig, 0.006)
     forces = _insert(made)
-    assert not made.port.wall.engaged
+    assert not made.port.engaged
     np.testing.assert_array_equal(forces, 0.0)

@@ -5,9 +5,8 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from surgsim.models.build import build, build_arm
+from surgsim.models.build import build
 from surgsim.models.config import InstrumentConfig, RobotConfig, SceneConfig, TrocarConfig, WallConfig
-from surgsim.plant.port import Port
 
 CLEARANCE_M = 0.00045
 K_CONTACT = 20000.0
@@ -119,15 +118,6 @@ def test_an_ideal_port_moves_and_pushes_nothing(rig):
     np.testing.assert_allclose(made.port.position(), made.data.site_xpos[made.scene.trocar_site], atol=1e-12)
     made.port.reset()
     np.testing.assert_allclose(made.port.rest(), made.scene.model.body("port").pos, atol=1e-12)
-
-
-def test_without_a_trocar_the_port_does_nothing():
-    scene = build_arm(SceneConfig(robot=RobotConfig(name="lwr4plus")))
-    port = Port(scene, mujoco.MjData(scene.model))
-    port.reset()
-    port.move(np.ones(3), np.ones(3))
-    port.act()
-    np.testing.assert_array_equal(port.force(), 0.0)
 
 
 def test_reset_forgets(rig):
