@@ -45,9 +45,18 @@ def workspace(n: int, rows: int) -> tuple[Array, Ids, Ids]:
 def _inverse_factor(H: Array, K: Array) -> bool:
     """K[:, :n] = L^-1 with H = L L^T; False where H is not positive definite."""
     n = H.shape[0]
+    diagonal = True
     for i in range(n):
-        for j in range(i + 1):
-            K[i, j] = H[i, j]
+        for j in range(i):
+            K[i, j], K[j, i] = H[i, j], 0.0
+            diagonal = diagonal and H[i, j] == 0.0
+        K[i, i] = H[i, i]
+    if diagonal:
+        for i in range(n):
+            if not K[i, i] > 0.0:
+                return False
+            K[i, i] = 1.0 / math.sqrt(K[i, i])
+        return True
     if not factor(K):
         return False
     for i in range(n):
@@ -58,8 +67,6 @@ def _inverse_factor(H: Array, K: Array) -> bool:
                 s += K[i, k] * K[k, j]
             K[i, j] = -s * scale
         K[i, i] = scale
-        for j in range(i + 1, n):
-            K[i, j] = 0.0
     return True
 
 
@@ -138,25 +145,16 @@ def _remove(K: Array, R: Array, q: int, at: int, active: Ids, b: Array, multipli
 
 
 @compiled
-def _bounds(lower: Array, upper: Array, G_lower: Array, G_upper: Array, k: int) -> tuple[float, float]:
-    """Bounds of row k."""
-    n = lower.size
-    if k < n:
-        return lower[k], upper[k]
-    return G_lower[k - n], G_upper[k - n]
-
-
-@compiled
 def _miss(
     x: Array, lower: Array, upper: Array, G: Array, G_lower: Array, G_upper: Array, k: int
 ) -> tuple[float, int]:
     """By how much row k is missed, relative to its length and bound, and on which side; (0, 0) if kept."""
     n = x.size
-    low, high = _bounds(lower, upper, G_lower, G_upper, k)
-    value, size = 0.0, 1.0
+    value, size, low, high = 0.0, 1.0, 0.0, 0.0
     if k < n:
-        value = x[k]
+        value, low, high = x[k], lower[k], upper[k]
     else:
+        low, high = G_lower[k - n], G_upper[k - n]
         for j in range(n):
             value += G[k - n, j] * x[j]
     if low <= value <= high:
@@ -186,7 +184,8 @@ def _begin(
     q = equal = 0
     for sweep in range(2):
         for k in range(n + G_lower.size):
-            low, high = _bounds(lower, upper, G_lower, G_upper, k)
+            low = lower[k] if k < n else G_lower[k - n]
+            high = upper[k] if k < n else G_upper[k - n]
             if low > high:
                 return -1, 0
             if (sweep == 0) != (low == high):
@@ -342,7 +341,7 @@ def solve(
                 x[j] += c * K[i, j]
         worst, p, way = FEASIBLE, -1, 0
         for k in range(n + m):
-            if side[k] == 0 and k != barred:
+            if side[k] == 0 and k != barred and (k >= n or not lower[k] <= x[k] <= upper[k]):
                 miss, towards = _miss(x, lower, upper, G, G_lower, G_upper, k)
                 if miss > worst:
                     worst, p, way = miss, k, towards
@@ -371,8 +370,11 @@ def solve(
             left += 1
             continue
         left = _look_again(side, left)
-        low, high = _bounds(lower, upper, G_lower, G_upper, p)
         _append(K, R, q, d, w)
-        active[q], b[q], multiplier[q], side[p] = p, high if way > 0 else low, gained, way
+        if p < n:
+            b[q] = upper[p] if way > 0 else lower[p]
+        else:
+            b[q] = G_upper[p - n] if way > 0 else G_lower[p - n]
+        active[q], multiplier[q], side[p] = p, gained, way
         q += 1
     return LIMIT
