@@ -11,7 +11,7 @@ from pydantic import NonNegativeFloat, PositiveFloat
 from surgsim.catalog import PartConfig
 from surgsim.compiled import compiled
 from surgsim.control.inside import Head
-from surgsim.control.mink_tasks import RcmTask
+from surgsim.control.mink_tasks import LimitRows, RcmTask
 from surgsim.control.resolvers.base import KernelResolver
 from surgsim.control.resolvers.rows import answer, fill_task_rows
 from surgsim.models.arm import ArmModel
@@ -101,8 +101,7 @@ class MinkSolver:
         self._tip = mink.FrameTask("tip", "site", position_cost=config.tip_cost, orientation_cost=0.0)
         self._tip.set_target(mink.SE3.identity())
         self._rcm = RcmTask(arm.scene.tip_site, model.nv)
-        speeds = dict(zip(joint_names(model), arm.limits.velocity.tolist(), strict=True))
-        self._velocity_limit = mink.VelocityLimit(model, speeds)
+        self._speeds = dict(zip(joint_names(model), arm.limits.velocity.tolist(), strict=True))
 
     @property
     def addresses(self) -> tuple[int, int, int]:
@@ -116,8 +115,7 @@ class MinkSolver:
         target, shift, answer = memory[_TARGET:_SHIFT], memory[_SHIFT:_QDOT], memory[_QDOT:]
         rows = [self._rcm] if seen["has_trocar"][0] else None
         gain = min(1.0, self._c.position_gain_per_s * dt)
-        model = self._configuration.model
-        limits = (self._velocity_limit, mink.ConfigurationLimit(model, gain=gain))
+        limits = [LimitRows(self._configuration.model, self._speeds, gain, dt, seen["q"])]
 
         def solve() -> int:
             self._tip.transform_target_to_world.wxyz_xyz[4:] = target
