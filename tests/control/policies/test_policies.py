@@ -1,6 +1,7 @@
 """Policies: their names, when they are asked, and what resolver and torque law make of them."""
 
 import sys
+import time
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -225,6 +226,22 @@ def test_a_huge_action_is_cut_at_the_limit(arm, velocity_problem, register):
     register("p", lambda _: [1e200, -1e200, 0.0])
     answer, _ = PolicyConfig(name="p").build(arm).step(velocity_problem(0), None)
     np.testing.assert_array_equal(answer.command.v_WTd, [0.1, -0.1, 0.0])
+
+
+def test_the_controller_s_time_has_that_of_the_policy_in_it(scenario, register):
+    """At least what the policy takes, in the ticks in which it is asked; every tick is timed."""
+
+    def busy(observation):
+        until = time.thread_time() + 0.002
+        while time.thread_time() < until:
+            pass
+        return np.zeros(3)
+
+    register("busy", busy)
+    asked = ("controller.resolver.name=busy", "controller.resolver.decimation=5", "task.duration_s=0.2")
+    took = simulate(scenario(*asked, controller="policy_proportional"))["control_time_s"]
+    assert np.isfinite(took).all()
+    assert (took[::5] >= 0.002).all()
 
 
 class PlainPinv:
