@@ -9,10 +9,17 @@ from surgsim.contract.arms import arm_of, on_every_arm
 from surgsim.contract.check import Check, require
 from surgsim.contract.problems import velocity_problem
 from surgsim.control.policies.observation import observe
+from surgsim.control.seen import seen_of_velocity
 from surgsim.models.arm import ArmModel
 from surgsim.models.config import SceneConfig
+from surgsim.tick.fields import fields_of
 
 Array = NDArray[np.float64]
+
+
+def _seen(arm: ArmModel, seed: int) -> dict[str, Array]:
+    """A random observation."""
+    return observe(fields_of(seen_of_velocity(velocity_problem(arm, seed), arm)))
 
 
 def _actions(policy: Any, arm: ArmModel) -> list[Array]:
@@ -20,7 +27,7 @@ def _actions(policy: Any, arm: ArmModel) -> list[Array]:
     reset = getattr(policy, "reset", None)
     if callable(reset):
         reset()
-    return [np.array(policy(observe(velocity_problem(arm, seed))), dtype=float) for seed in range(10)]
+    return [np.array(policy(_seen(arm, seed)), dtype=float) for seed in range(10)]
 
 
 @on_every_arm
@@ -41,7 +48,7 @@ def acts(policy: Any, scene: SceneConfig) -> None:
 @on_every_arm
 def leaves_the_observation(policy: Any, scene: SceneConfig) -> None:
     """The observation is left as it was."""
-    seen = observe(velocity_problem(arm_of(scene), 0))
+    seen = _seen(arm_of(scene), 0)
     before = {name: values.copy() for name, values in seen.items()}
     policy(seen)
     changed = [name for name in before if not np.array_equal(seen.get(name, np.nan), before[name])]

@@ -1,27 +1,27 @@
 """Joins a controller's parts, kernels or Python objects, to the arrays of its tick."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba.core.dispatcher import Dispatcher
 from numpy.typing import NDArray
 
 from surgsim.columns import Block
 from surgsim.compiled import address_of
 from surgsim.control.decision import ESTIMATOR, LAW, SOLVER
 from surgsim.control.failure import ControlFailure, failure_of
+from surgsim.control.joining import Call, Desk, Joined, join, join_resolver, memory_size
 from surgsim.control.port_estimators.base import PortEstimate, PortEstimator, port_problem_of
 from surgsim.control.problem import Resolution
 from surgsim.control.resolvers.base import Resolver
-from surgsim.control.seen import fill_constants, velocity_problem_of
+from surgsim.control.seen import fill_constants
 from surgsim.control.torque_laws.base import TorqueLaw, torque_problem_of
 from surgsim.errors import Outcome
 from surgsim.models.arm import ArmModel
-from surgsim.tick.arrays import Control, law_signature, new, point, resolver_signature
-from surgsim.tick.python_part import PythonPart, python_kernel
-from surgsim.tick.status import INFEASIBLE, RANK_LOST, TOLD
+from surgsim.tick.arrays import Control, Resolved, Seen, law_signature, new, point
+from surgsim.tick.fields import fields_of
+from surgsim.tick.python_part import first_raised, python_kernel
+from surgsim.tick.status import TOLD
 
 Array = NDArray[np.float64]
 
@@ -62,18 +62,6 @@ class ControllerParts:
         """The resolver's columns."""
         return tuple(getattr(self.resolver, "columns", ()))
 
-    def arrays(self, n: int) -> PartArrays:
-        """Numbers and memories of the parts, for n joints."""
-        return PartArrays(
-            port_gains=_gains(self.port),
-            port_memory=_memory(self.port),
-            resolver_gains=_gains(self.resolver),
-            resolver_memory=_memory(self.resolver),
-            law_gains=_gains(self.law),
-            law_memory=_memory(self.law),
-            terms=np.zeros((len(self.terms), n)),
-        )
-
 
 def new_control(
     arm: ArmModel, *, dt_s: float, has_trocar: bool, has_law: bool, omega_gain: float, at_reference: bool
@@ -88,36 +76,28 @@ def new_control(
     return c
 
 
-def _gains(part: Any) -> Array:
-    """The part's numbers; one place for the address of a part that is entered in Python."""
-    return part.gains.copy() if _is_compiled(part) else np.zeros(1)
-
-
-def _memory(part: Any) -> Array:
-    return np.zeros(getattr(part, "memory_size", 0))
-
-
-def _is_compiled(part: Any) -> bool:
-    return isinstance(getattr(part, "kernel", None), Dispatcher)
-
-
 @dataclass(frozen=True, kw_only=True)
 class Bound:
     """Parts joined to the records of a tick.
 
     Attributes:
-        entered: The parts that are entered in Python, by the value of `Control.who`.
         parts: The parts.
         control: The record of the tick.
         arrays: Their numbers and memories.
-        remembered: What the parts that are Python objects remember, by the value of `Control.who`.
+        joined: The parts as the tick calls them, by the value of `Control.who`.
+        remembered: What the parts that are Python objects remember, by their names.
     """
 
-    entered: dict[int, PythonPart]
     parts: ControllerParts
     control: Control
     arrays: PartArrays
-    remembered: dict[int, Any]
+    joined: dict[int, Joined]
+    remembered: dict[str, Any]
+
+    @property
+    def entered(self) -> tuple[int, ...]:
+        """The parts that Python is entered for, by the value of `Control.who`."""
+        return tuple(who for who, part in self.joined.items() if part.entered)
 
     def failure(self, status: int) -> ControlFailure:
         """Why the last tick has no answer.
@@ -126,7 +106,7 @@ class Bound:
             BaseException: What a Python part raised, if that is no failure of a controller.
         """
         who, c = int(self.control.who), self.control
-        error = self.entered[who].raised() if who in self.entered else None
+        error = first_raised(self.joined[who].entered)
         if status == TOLD or error is not None:
             if isinstance(error, ControlFailure):
                 return error
@@ -145,101 +125,65 @@ class Bound:
         return failure_of(status, {}, {"q": seen.q.copy()})
 
 
-def _status_of(error: BaseException) -> int:
-    """The status of a tick in which a part in Python raised `error`."""
-    if isinstance(error, np.linalg.LinAlgError):
-        return RANK_LOST
-    infeasible = isinstance(error, ControlFailure) and error.outcome is Outcome.INFEASIBLE
-    return INFEASIBLE if infeasible else TOLD
-
-
 def bind(parts: ControllerParts, control: Control, arm: ArmModel) -> Bound:
     """Join the parts to the record of a tick; those that are no compiled kernel are entered in Python."""
-    entered: dict[int, PythonPart] = {}
-    remembered: dict[int, Any] = {}
-    n = arm.limits.q_min.size
-    minds = parts.arrays(n)
-    for name, array in minds._asdict().items():
-        point(control.minds[name], array)
+    c, n, remembered = control, arm.limits.q_min.size, dict[str, Any]()
+    terms = np.zeros((len(parts.terms), n))
 
-    def kernel(who: int, part: Any, gains: Array, call: Callable[[], int | None]) -> int:
-        signature = resolver_signature(n) if who == SOLVER else law_signature(n)
-        if _is_compiled(part):
-            return address_of(part.kernel, signature)
-        if part is not None:
-            entered[who] = PythonPart(call, _status_of)
-            gains[:] = entered[who].gains
-        return address_of(python_kernel, signature)
+    def desk(part: Any, seen: Seen, out: Any) -> Desk:
+        memory = np.zeros(memory_size(part))
+        return Desk(seen=seen, out=out, memory=memory, limits=arm.limits, remembered=remembered)
 
-    port, resolver, law = parts.port, parts.resolver, parts.law
-    solve = _resolver_call(parts, control, minds, arm, remembered)
-    at = control.minds
-    at.port = kernel(ESTIMATOR, port, minds.port_gains, _port_call(port, control, minds, remembered))
-    at.resolver = kernel(SOLVER, resolver, minds.resolver_gains, solve)
-    at.law = kernel(LAW, law, minds.law_gains, _law_call(law, control, minds, remembered))
-    return Bound(
-        entered=entered,
-        parts=parts,
-        control=control,
-        arrays=minds,
-        remembered=remembered,
+    at_port = desk(parts.port, c.seen, c.port)
+    at_resolver = desk(parts.resolver, c.referred if c.at_reference else c.seen, c.resolved)
+    at_law, signature = desk(parts.law, c.seen, terms), law_signature(n)
+    call = _port_call(parts.port, at_port, has_dynamics=bool(c.has_law))
+    port = join(parts.port, at_port, signature, call, "port")
+    resolver = join_resolver(parts.resolver, at_resolver, "resolver")
+    law = Joined(kernel=address_of(python_kernel, signature), gains=np.zeros(1))
+    if parts.law is not None:
+        law = join(parts.law, at_law, signature, _law_call(parts.law, at_law, c.resolved), "law")
+    minds = PartArrays(
+        port_gains=port.gains,
+        port_memory=at_port.memory,
+        resolver_gains=resolver.gains,
+        resolver_memory=at_resolver.memory,
+        law_gains=law.gains,
+        law_memory=at_law.memory,
+        terms=terms,
     )
+    for name, array in minds._asdict().items():
+        point(c.minds[name], array)
+    c.minds.port, c.minds.resolver, c.minds.law = port.kernel, resolver.kernel, law.kernel
+    joined = {ESTIMATOR: port, SOLVER: resolver, LAW: law}
+    return Bound(parts=parts, control=control, arrays=minds, joined=joined, remembered=remembered)
 
 
-def _port_call(
-    port: Any, c: Control, minds: PartArrays, remembered: dict[int, Any]
-) -> Callable[[], int | None]:
-    if hasattr(port, "kernel"):
-        return lambda: port.kernel(port.gains, c.seen, minds.port_memory, c.port)
+def _port_call(port: Any, desk: Desk, *, has_dynamics: bool) -> Call:
+    """A tick of a port estimator that is a Python object."""
+    seen, out, remembered = fields_of(desk.seen), desk.out, desk.remembered
 
     def call() -> None:
-        problem = port_problem_of(c.seen, has_dynamics=bool(c.has_law))
-        if c.seen.first:
-            remembered[ESTIMATOR] = port.start(problem)
+        problem = port_problem_of(seen, has_dynamics=has_dynamics)
+        if seen["first"][0]:
+            remembered["port"] = port.start(problem)
         estimate: PortEstimate
-        estimate, remembered[ESTIMATOR] = port.step(problem, remembered[ESTIMATOR])
-        c.port[0], c.port[1], c.port[2] = estimate.p_WC, estimate.v_WC, estimate.a_WC
+        estimate, remembered["port"] = port.step(problem, remembered["port"])
+        out[0], out[1], out[2] = estimate.p_WC, estimate.v_WC, estimate.a_WC
 
     return call
 
 
-def _resolver_call(
-    parts: ControllerParts, c: Control, minds: PartArrays, arm: ArmModel, remembered: dict[int, Any]
-) -> Callable[[], int | None]:
-    resolver: Any = parts.resolver
-    seen, out = c.referred if c.at_reference else c.seen, c.resolved
-    limits = arm.limits
-    if hasattr(resolver, "kernel"):
-        return lambda: resolver.kernel(resolver.gains, seen, minds.resolver_memory, out)
+def _law_call(law: TorqueLaw[Any], desk: Desk, resolved: Resolved) -> Call:
+    """A tick of a torque law that is a Python object."""
+    seen, answer, remembered = fields_of(desk.seen), fields_of(resolved), desk.remembered
 
     def call() -> None:
-        problem = velocity_problem_of(seen, limits)
-        if seen["first"]:
-            remembered[SOLVER] = resolver.start(problem)
-        found: Resolution
-        found, remembered[SOLVER] = resolver.step(problem, remembered[SOLVER])
-        out["qdot"], out["residual"] = found.qdot, found.residual
-        if found.values.size:
-            out["values"][: found.values.size] = found.values
-        if found.command is not None:
-            told = found.command
-            out["p_WTd"], out["v_WTd"], out["a_WTd"] = told.p_WTd, told.v_WTd, told.a_WTd
-
-    return call
-
-
-def _law_call(
-    law: Any, c: Control, minds: PartArrays, remembered: dict[int, Any]
-) -> Callable[[], int | None]:
-    if hasattr(law, "kernel"):
-        return lambda: law.kernel(law.gains, c.seen, minds.law_memory, minds.terms)
-
-    def call() -> None:
-        out = c.resolved
-        resolution = Resolution(qdot=out.qdot.copy(), residual=float(out.residual), values=out.values.copy())
-        problem = torque_problem_of(c.seen, resolution)
-        if c.seen.first:
-            remembered[LAW] = law.start(problem)
-        minds.terms[:], remembered[LAW] = law.torque(problem, remembered[LAW])
+        qdot, residual, values = answer["qdot"], answer["residual"], answer["values"]
+        resolution = Resolution(qdot=qdot.copy(), residual=residual.item(), values=values.copy())
+        problem = torque_problem_of(seen, resolution)
+        if seen["first"][0]:
+            remembered["law"] = law.start(problem)
+        desk.out[:], remembered["law"] = law.torque(problem, remembered["law"])
 
     return call

@@ -14,6 +14,7 @@ from surgsim.compiled import as_parameter
 from surgsim.control.binding import ControllerParts, bind, new_control
 from surgsim.control.decision import decide, decide_signature, forget
 from surgsim.control.failure import ControlFailure
+from surgsim.control.joining import has_state_in_python
 from surgsim.control.port_estimators import PORT_ESTIMATORS
 from surgsim.control.port_estimators.base import PortEstimatorConfig
 from surgsim.control.port_estimators.measured import MeasuredPortConfig
@@ -162,7 +163,7 @@ class Controller:
         """What of the controller is a Python object with a state, by name."""
         port, resolver, law = self.parts.port, self.parts.resolver, self.parts.law
         parts: dict[str, object] = {"port": port, "resolver": resolver, "torque_law": law}
-        named = {f"controller.{name}": part for name, part in parts.items() if not hasattr(part, "kernel")}
+        named = {f"controller.{name}": part for name, part in parts.items() if has_state_in_python(part)}
         return {**named, "controller's memory": self._bound.remembered}
 
     @property
@@ -173,7 +174,7 @@ class Controller:
 
     @property
     def is_compiled(self) -> bool:
-        """Whether all its parts are compiled kernels."""
+        """Whether all its parts are compiled kernels that enter no Python."""
         return not self._bound.entered
 
     def reset(self) -> None:

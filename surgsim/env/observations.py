@@ -1,15 +1,13 @@
 """Observations: what every policy sees, with bounds."""
 
 from collections import OrderedDict
-from dataclasses import dataclass
 
 import numpy as np
 from dm_env import specs
 from numpy.typing import NDArray
 
 from surgsim.control.policies.observation import observe
-from surgsim.control.rcm import Rcm, rcm_kinematics
-from surgsim.models.arm import Kinematics
+from surgsim.control.rcm import rcm_kinematics
 from surgsim.plant.state import State
 from surgsim.scenario.schema import Scenario
 from surgsim.simulate.setup import Setup
@@ -26,20 +24,6 @@ _JOINT_MARGIN_RAD = 0.5
 _JOINT_SPEED_MARGIN = 2.0
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Seen:
-    """What `observe` needs, at a state of the plant."""
-
-    t_s: float
-    q: Array
-    v: Array
-    kin: Kinematics
-    command: TipCommand
-    rcm: Rcm | None
-    p_WC: Array
-    v_WC: Array
-
-
 def observation_of(setup: Setup, state: State, command: TipCommand, bounds: Specs) -> Observations:
     """The observation at `state`, see `surgsim.control.policies.observation.observe`, cut at `bounds`.
 
@@ -48,16 +32,21 @@ def observation_of(setup: Setup, state: State, command: TipCommand, bounds: Spec
     """
     kin = setup.arm.kinematics(state.q)
     has_trocar = setup.scenario.trocar is not None
-    seen = _Seen(
-        t_s=state.t_s,
-        q=state.q,
-        v=state.v,
-        kin=kin,
-        command=command,
-        rcm=rcm_kinematics(kin, state.p_WC, state.v_WC) if has_trocar else None,
-        p_WC=state.p_WC,
-        v_WC=state.v_WC,
-    )
+    seen = {
+        "t_s": np.array([state.t_s]),
+        "q": state.q,
+        "v": state.v,
+        "p_WT": kin.p_WT,
+        "p_WTd": command.p_WTd,
+        "v_WTd": command.v_WTd,
+        "a_WTd": command.a_WTd,
+        "has_trocar": np.array([float(has_trocar)]),
+        "p_WC": state.p_WC,
+        "v_WC": state.v_WC,
+    }
+    if has_trocar:
+        rcm = rcm_kinematics(kin, state.p_WC, state.v_WC)
+        seen["rcm_error"], seen["depth"] = rcm.error, np.array([rcm.depth])
     return OrderedDict((name, _cut(value, bounds[name])) for name, value in observe(seen).items())
 
 

@@ -19,7 +19,7 @@ from surgsim.plant.bore import Bore
 from surgsim.plant.part import PlantPart
 from surgsim.plant.state import State
 from surgsim.tick.arrays import Numbers, Record, World, hook_signature, new, point, type_of
-from surgsim.tick.python_part import PythonPart, python_kernel
+from surgsim.tick.python_part import PythonPart, first_raised, python_kernel
 from surgsim.tick.status import GOES_ON
 from surgsim.tick.views import vector, words
 
@@ -192,8 +192,7 @@ class HookTable:
 
     def raised(self) -> BaseException | None:
         """What a hook in Python raised."""
-        errors = [part.raised() for part in self._entered]
-        return next((error for error in errors if error is not None), None)
+        return first_raised(self._entered)
 
 
 def _in_python(hook: Hook) -> bool:

@@ -4,6 +4,7 @@ import math
 
 from surgsim.tasks.base import EnergyBudget, TipCommand
 from surgsim.tick.arrays import Command, Seen
+from surgsim.tick.fields import Fields
 
 
 def fill_command_of(out: Command | Seen, command: TipCommand) -> None:
@@ -22,16 +23,16 @@ def fill_command(out: Command, command: TipCommand) -> None:
     out["rcm_shift_rate"] = 0.0 if command.rcm_shift_rate is None else command.rcm_shift_rate
 
 
-def command_of(told: Command | Seen) -> TipCommand:
+def command_of(told: Command | Seen | Fields) -> TipCommand:
     """A copy of the command in a `Command` or `Seen`; a shift of the remote centre is left out."""
-    budget, most_j = None, float(told["budget_j"])
+    budget, most_j = None, told["budget_j"].item()
     if math.isfinite(most_j):
         budget = EnergyBudget(most_j=most_j, f_T=told["budget_f_T"].copy())
     return TipCommand(
         p_WTd=told["p_WTd"].copy(),
         v_WTd=told["v_WTd"].copy(),
         a_WTd=told["a_WTd"].copy(),
-        roll_rate=float(told["roll_rate"]),
-        jaw=float(told["jaw"]),
+        roll_rate=told["roll_rate"].item(),
+        jaw=told["jaw"].item(),
         budget=budget,
     )

@@ -7,7 +7,7 @@ status, and whoever runs the loop raises it again.
 """
 
 import ctypes
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any
 
 import numpy as np
@@ -31,7 +31,7 @@ class PythonPart:
 
     Attributes:
         gains: The trampoline's gains: the address of the C function (1,).
-        error: What `call` raised, until it is taken by `raised`.
+        error: What `call` raised, until it is taken by `raised` or entered again.
     """
 
     def __init__(
@@ -44,6 +44,7 @@ class PythonPart:
         self.error: BaseException | None = None
 
     def _enter(self) -> int:
+        self.error = None
         try:
             status = self._call()
         except BaseException as error:  # an exception that leaves here is printed and lost
@@ -52,9 +53,15 @@ class PythonPart:
         return GOES_ON if status is None else int(status)
 
     def raised(self) -> BaseException | None:
-        """The exception since the last call of this, if any."""
+        """The exception of the last time that it was entered, once."""
         error, self.error = self.error, None
         return error
+
+
+def first_raised(parts: Iterable[PythonPart]) -> BaseException | None:
+    """What the first of them raised that raised something; it is taken from all."""
+    errors = [part.raised() for part in parts]
+    return next((error for error in errors if error is not None), None)
 
 
 @intrinsic

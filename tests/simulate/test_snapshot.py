@@ -6,6 +6,7 @@ from typing import get_type_hints
 import numpy as np
 import pytest
 
+from surgsim.control.controller import ControllerConfig
 from surgsim.control.policies.registry import offering
 from surgsim.errors import SurgsimError
 from surgsim.plant.part import BLOCK_TICKS
@@ -17,7 +18,7 @@ SHORT = ("task.duration_s=1", "task.ramp_s=0.2", "task.hold_start_s=0.1", "task.
 LONG = ("task.duration_s=5", "task.ramp_s=0.2", "task.hold_start_s=0.1", "task.hold_end_s=0.1")
 DRAWN = ("disturbances=[{type: sensor_noise}, {type: actuation_delay, delay_s: 0.001, jitter_s: 0.001}]",)
 CONTROLLERS = ("pinv", "gradient", "rnn", "vprnn", "qp", "passive_convex", "rcm_inverse_dynamics", "mink")
-CONTROLLERS += ("self_motion",)
+CONTROLLERS += ("self_motion", "policy_proportional")
 
 
 def _begun(scenario, ticks):
@@ -104,26 +105,62 @@ POLICY = {
 }
 
 
-def test_a_policy_in_python_goes_on_where_it_was(tmp_path):
-    from surgsim.control.controller import ControllerConfig
-
+@pytest.mark.parametrize(
+    ("decimation", "asked", "asked_at_the_end"),
+    [(1, 33, 83), (7, 5, 12)],
+    ids=["each tick", "in the midst of a hold"],
+)
+def test_a_policy_in_python_goes_on_where_it_was(decimation, asked, asked_at_the_end):
+    resolver = {**POLICY["resolver"], "decimation": decimation}
+    config = ControllerConfig.model_validate({**POLICY, "resolver": resolver})
     with offering("counting", policy := Counting()):
-        scenario = load_scenario(
-            "circle_panda", controller=ControllerConfig.model_validate(POLICY), assignments=SHORT
-        )
+        scenario = load_scenario("circle_panda", controller=config, assignments=SHORT)
         simulation = _begun(scenario, 33)
-        taken = simulation.snapshot()
+        taken = pickle.loads(pickle.dumps(simulation.snapshot()))
         expected = _rest(simulation, 50)
-        assert policy.asked == 83
+        assert policy.asked == asked_at_the_end
         simulation.restore(taken)
-        assert policy.asked == 33
+        assert policy.asked == asked
         _same(_rest(simulation, 50), expected)
+        assert policy.asked == asked_at_the_end
+
+
+HOLDING = {
+    "tip velocity": {"resolver": {"type": "policy", "decimation": 7}, "torque_law": POLICY["torque_law"]},
+    "over mink": {
+        "resolver": {"type": "policy", "decimation": 7, "resolver": {"type": "mink"}},
+        "torque_law": POLICY["torque_law"],
+    },
+    "joint velocity": {
+        "resolver": {"type": "policy", "name": "wave", "action": "joint_velocity", "decimation": 7},
+        "torque_law": POLICY["torque_law"],
+    },
+    "torque": {
+        "resolver": {"type": "pinv"},
+        "torque_law": {"type": "policy", "name": "wave", "decimation": 7},
+    },
+}
+
+
+def _wave(observation):
+    return 0.05 * np.sin(30.0 * observation["time"] + np.arange(7))
+
+
+@pytest.mark.parametrize("ticks", [34, 35, 36])
+@pytest.mark.parametrize("parts", HOLDING.values(), ids=HOLDING)
+def test_a_fork_holds_the_action_that_was_held(parts, ticks):
+    config = ControllerConfig.model_validate({"name": "holding", **parts})
+    with offering("wave", _wave):
+        simulation = _begun(load_scenario("circle_panda", controller=config, assignments=SHORT), ticks)
+        fork, taken = simulation.fork(), simulation.snapshot()
+        expected = _rest(simulation, 30)
+        _same(_rest(fork, 30), expected)
+        simulation.restore(taken)
+        _same(_rest(simulation, 30), expected)
 
 
 def test_a_part_that_cannot_be_copied_is_named():
     with offering("counting", policy := Counting()):
-        from surgsim.control.controller import ControllerConfig
-
         scenario = load_scenario(
             "circle_panda", controller=ControllerConfig.model_validate(POLICY), assignments=SHORT
         )

@@ -12,6 +12,7 @@ from surgsim.control.failure import ControlFailure, failure_of
 from surgsim.control.seen import dynamics_of, fill_kinematics, kinematics_of, new_seen
 from surgsim.models.arm import ArmModel, Dynamics, Kinematics
 from surgsim.tick.arrays import Seen
+from surgsim.tick.fields import Fields
 from surgsim.tick.status import GOES_ON
 
 Array = NDArray[np.float64]
@@ -142,15 +143,15 @@ class KernelPortEstimator:
         return seen
 
 
-def port_problem_of(seen: Seen, *, has_dynamics: bool) -> PortProblem:
+def port_problem_of(seen: Fields, *, has_dynamics: bool) -> PortProblem:
     """What a port estimator in Python is given."""
     return PortProblem(
-        t_s=float(seen.t_s),
-        dt_s=float(seen.dt_s),
-        v=seen.v.copy(),
-        tau_measured=seen.tau.copy(),
+        t_s=seen["t_s"].item(),
+        dt_s=seen["dt_s"].item(),
+        v=seen["v"].copy(),
+        tau_measured=seen["tau"].copy(),
         kin=kinematics_of(seen),
         dyn=dynamics_of(seen) if has_dynamics else None,
-        p_WC=seen.p_WC.copy(),
-        v_WC=seen.v_WC.copy(),
+        p_WC=seen["p_WC"].copy(),
+        v_WC=seen["v_WC"].copy(),
     )

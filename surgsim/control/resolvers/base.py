@@ -10,11 +10,14 @@ from numpy.typing import NDArray
 from surgsim.catalog import Surroundings
 from surgsim.columns import Block
 from surgsim.control.failure import ControlFailure, failure_of
+from surgsim.control.inside import Inside
+from surgsim.control.joining import Desk, furnish
 from surgsim.control.problem import Resolution, VelocityProblem
-from surgsim.control.seen import fill_velocity_problem, new_seen
+from surgsim.control.seen import seen_of_velocity
 from surgsim.models.arm import ArmModel
 from surgsim.tasks.base import TipCommand
 from surgsim.tick.arrays import Resolved, Seen, new
+from surgsim.tick.python_part import first_raised
 from surgsim.tick.status import GOES_ON
 
 Array = NDArray[np.float64]
@@ -64,6 +67,19 @@ class ResolverConfig(Protocol):
         ...
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class KernelMemory:
+    """Memory of a kernel with a resolver below it that is a Python object.
+
+    Attributes:
+        numbers: Of the kernel.
+        remembered: What the Python object remembers, by its name.
+    """
+
+    numbers: Array
+    remembered: Mapping[str, Any]
+
+
 @dataclass(frozen=True, kw_only=True)
 class KernelResolver:
     """A resolver whose law is a kernel: the loop calls the kernel, this calls it from Python.
@@ -71,12 +87,14 @@ class KernelResolver:
     Attributes:
         kernel: status = kernel(gains, seen, memory, out); compiled for `RESOLVER`, or plain Python.
         arm: The nominal arm.
-        gains: The law's numbers, laid out as the kernel says.
+        gains: The law's numbers, laid out as the kernel says; with something inside they begin with a `Head`.
         memory_size: Length of its memory, all zeros before the first step.
         columns: What it adds to the trace.
         failures: What each status of the kernel means, for the person who reads the outcome: words, or a
             function of what the kernel saw.
         examine: Arrays that let a failure be examined, from what the kernel saw and remembered.
+        inside: What the kernel enters in Python.
+        below: The resolver that the kernel calls; its memory is the end of this one's.
     """
 
     kernel: ResolverKernel
@@ -86,34 +104,43 @@ class KernelResolver:
     columns: tuple[Block, ...] = ()
     failures: Mapping[int, str | Callable[[Seen], str]] = field(default_factory=dict)
     examine: Callable[[Array, Seen, Array], Mapping[str, Array]] | None = None
+    inside: Inside | None = None
+    below: Resolver[Any] | None = None
 
     def start(self, problem: VelocityProblem) -> None:
         """The kernel makes its own memory at the first step."""
 
-    def step(self, problem: VelocityProblem, memory: Array | None) -> tuple[Resolution, Array]:
+    def step(self, problem: VelocityProblem, memory: Any) -> tuple[Resolution, Any]:
         """Joint velocities for one period, and the kernel's memory; None is that before the first step.
+
+        The memory is an array (memory_size,), with a Python object below the kernel a `KernelMemory`.
 
         Raises:
             ControlFailure: If the kernel has no answer.
+            BaseException: What a Python part inside it raised.
         """
-        seen = self.seen(problem)
-        seen["first"] = memory is None
-        after = np.zeros(self.memory_size) if memory is None else memory.copy()
+        numbers, remembered = memory, dict[str, Any]()
+        if isinstance(memory, KernelMemory):
+            numbers, remembered = memory.numbers, dict(memory.remembered)
+        seen = seen_of_velocity(problem, self.arm)
+        seen["first"] = numbers is None
+        after = np.zeros(self.memory_size) if numbers is None else numbers.copy()
         out, told = new(Resolved, problem.q.size), problem.command
         out["p_WTd"], out["v_WTd"], out["a_WTd"] = told.p_WTd, told.v_WTd, told.a_WTd
-        status = self.kernel(self.gains, seen, after, out)
+        desk = Desk(seen=seen, out=out, memory=after, limits=problem.limits, remembered=remembered)
+        own = furnish(self, desk, "resolver")
+        status = self.kernel(own.gains, seen, after, out)
         if status != GOES_ON:
-            raise self.failure(status, seen, after)
-        return self._resolution(problem, out), after
-
-    def seen(self, problem: VelocityProblem) -> Seen:
-        """What the kernel sees of a problem."""
-        seen = new_seen(self.arm, dt_s=problem.dt_s, has_trocar=problem.rcm is not None)
-        fill_velocity_problem(seen, problem)
-        return seen
+            raise first_raised(own.entered) or self.failure(status, seen, after)
+        answer = self._resolution(problem, out)
+        return answer, KernelMemory(numbers=after, remembered=remembered) if remembered else after
 
     def failure(self, status: int, seen: Seen, memory: Array) -> ControlFailure:
-        """Why there is no answer."""
+        """Why there is no answer: its own, or that of the resolver below."""
+        below: Any = self.below
+        if below is not None and hasattr(below, "failure"):
+            failure: ControlFailure = below.failure(status, seen, memory[memory.size - below.memory_size :])
+            return failure
         data = {"q": seen.q.copy()} if self.examine is None else self.examine(self.gains, seen, memory)
         told = {of: text if isinstance(text, str) else text(seen) for of, text in self.failures.items()}
         return failure_of(status, told, data)

@@ -1,6 +1,7 @@
 """mink: the differential inverse kinematics library, with the RCM as hard rows."""
 
-from typing import Literal
+from collections.abc import Callable, Mapping
+from typing import ClassVar, Literal
 
 import mink
 import numpy as np
@@ -8,12 +9,21 @@ from numpy.typing import NDArray
 from pydantic import NonNegativeFloat, PositiveFloat
 
 from surgsim.catalog import PartConfig
-from surgsim.control.failure import ControlFailure
-from surgsim.control.mink_tasks import RcmTask
-from surgsim.control.problem import Resolution, VelocityProblem, bounded_resolution, stacked_rows
-from surgsim.errors import Outcome
+from surgsim.compiled import compiled
+from surgsim.control.inside import Head
+from surgsim.control.mink_tasks import LimitRows, RcmTask
+from surgsim.control.resolvers.base import KernelResolver
+from surgsim.control.resolvers.rows import answer, fill_task_rows
 from surgsim.models.arm import ArmModel
 from surgsim.models.robot import joint_names
+from surgsim.tick.arrays import Record, Resolved, Seen
+from surgsim.tick.fields import Fields
+from surgsim.tick.mujoco_calls import mj_comPos, mj_kinematics
+from surgsim.tick.overlay import laid_over, overlay
+from surgsim.tick.python_part import enter
+from surgsim.tick.scratch import scratch, scratch_matrix
+from surgsim.tick.status import GOES_ON, INFEASIBLE
+from surgsim.tick.views import vector
 
 Array = NDArray[np.float64]
 
@@ -36,68 +46,134 @@ class MinkConfig(PartConfig):
     damping: PositiveFloat = 1e-9
     position_gain_per_s: PositiveFloat = 10.0
 
-    def build(self, arm: ArmModel) -> "Mink":
+    def build(self, arm: ArmModel) -> KernelResolver:
         """The resolver."""
-        return Mink(self, arm)
+        solver, gains = MinkSolver(self, arm), np.zeros(LAW_SIZE)
+        law, n = laid_over(Law, gains), arm.limits.q_min.size
+        law.k_tip, law.k_rcm = self.k_tip, self.k_rcm
+        law.mj_model, law.mj_data, law.qpos = solver.addresses
+        return KernelResolver(
+            kernel=mink_velocity,
+            arm=arm,
+            gains=gains,
+            memory_size=_QDOT + n,
+            failures={INFEASIBLE: "mink found no velocity that meets RCM and limits"},
+            examine=_examine,
+            inside=solver,
+        )
 
 
-class Mink:
+class Law(Record):
+    """Gains of the kernel.
+
+    Attributes:
+        head: Where mink is.
+        k_tip: Tip feedback gain [1/s].
+        k_rcm: RCM feedback gain [1/s].
+        mj_model: Address of the model of mink's configuration.
+        mj_data: Of its data.
+        qpos: Of the joint positions in them.
+    """
+
+    ADDRESSES: ClassVar[frozenset[str]] = frozenset(("mj_model", "mj_data", "qpos"))
+    head: Head
+    k_tip: float
+    k_rcm: float
+    mj_model: int
+    mj_data: int
+    qpos: int
+
+
+LAW, LAW_SIZE = overlay(Law)
+_TARGET, _SHIFT, _QDOT = 0, 3, 5
+
+
+class MinkSolver:
     """mink 1.x: min |J_T dq - T v_d|^2 + damping |dq|^2 subject to J_rcm dq = T v_rcm and limits on dq.
 
-    The feed-forward enters as a target one period ahead, the feedback gains as in `stacked_rows`, so that
+    The feed-forward enters as a target one period ahead, the feedback gains as in `fill_task_rows`, so that
     mink solves the same problem as the other resolvers. Source: mink's documentation of `solve_ik`.
     """
 
     def __init__(self, config: MinkConfig, arm: ArmModel) -> None:
-        self._c = config
-        model = arm.scene.model
+        self._c, model = config, arm.scene.model
         self._configuration = mink.Configuration(model)
         self._tip = mink.FrameTask("tip", "site", position_cost=config.tip_cost, orientation_cost=0.0)
+        self._tip.set_target(mink.SE3.identity())
         self._rcm = RcmTask(arm.scene.tip_site, model.nv)
-        speeds = dict(zip(joint_names(model), arm.limits.velocity.tolist(), strict=True))
-        self._model = model
-        self._velocity_limit = mink.VelocityLimit(model, speeds)
-        self._limits: tuple[mink.Limit, ...] = ()
-        self._limits_dt_s = 0.0
+        self._speeds = dict(zip(joint_names(model), arm.limits.velocity.tolist(), strict=True))
 
-    def start(self, problem: VelocityProblem) -> None:
-        """The resolver has no state."""
+    @property
+    def addresses(self) -> tuple[int, int, int]:
+        """Of the configuration's model, its data and the joint positions in them."""
+        data = self._configuration.data
+        return self._configuration.model._address, data._address, data.qpos.ctypes.data
 
-    def step(self, problem: VelocityProblem, memory: None) -> tuple[Resolution, None]:
-        """Joint velocities for one period."""
-        J, v = stacked_rows(problem, self._c.k_tip, self._c.k_rcm)
-        dt, configuration = problem.dt_s, self._configuration
-        configuration.update(problem.q)
-        self._tip.set_target(mink.SE3.from_translation(problem.kin.p_WT + dt * v[:3]))
-        try:
-            qdot = mink.solve_ik(
-                configuration,
-                [self._tip],
-                dt,
-                "daqp",
-                self._c.damping,
-                limits=self._limits_for(dt),
-                constraints=self._hard_rows(problem, v),
-            )
-        except mink.NoSolutionFound as error:
-            raise ControlFailure(
-                Outcome.INFEASIBLE, "mink found no velocity that meets RCM and limits", {"J": J, "v": v}
-            ) from error
-        return bounded_resolution(problem, np.asarray(qdot), J, v), None
+    def join(self, seen: Fields, memory: Array) -> Callable[[], int]:
+        """What the kernel enters to have mink's answer to the target and the RCM's shift in its memory."""
+        dt, normals, p_WC = seen["dt_s"].item(), seen["normals"].T, seen["p_WC"]
+        target, shift, answer = memory[_TARGET:_SHIFT], memory[_SHIFT:_QDOT], memory[_QDOT:]
+        rows = [self._rcm] if seen["has_trocar"][0] else None
+        gain = min(1.0, self._c.position_gain_per_s * dt)
+        limits = [LimitRows(self._configuration.model, self._speeds, gain, dt, seen["q"])]
 
-    def _limits_for(self, dt_s: float) -> tuple[mink.Limit, ...]:
-        """Limits for a control period, as mink wants them; making them takes as long as its solver."""
-        if dt_s != self._limits_dt_s:
-            gain = min(1.0, self._c.position_gain_per_s * dt_s)
-            self._limits = (self._velocity_limit, mink.ConfigurationLimit(self._model, gain=gain))
-            self._limits_dt_s = dt_s
-        return self._limits
+        def solve() -> int:
+            self._tip.transform_target_to_world.wxyz_xyz[4:] = target
+            if rows:
+                self._rcm.target = p_WC + normals @ shift
+            try:
+                answer[:] = mink.solve_ik(
+                    self._configuration,
+                    [self._tip],
+                    dt,
+                    "daqp",
+                    self._c.damping,
+                    limits=limits,
+                    constraints=rows,
+                )
+            except mink.NoSolutionFound:
+                return INFEASIBLE
+            return GOES_ON
 
-    def _hard_rows(self, problem: VelocityProblem, v: Array) -> list[RcmTask] | None:
-        """The RCM rows, aimed so that J_rcm dq = T v_rcm."""
-        if problem.rcm is None:
-            return None
-        wanted = problem.dt_s * v[3:]  # the row reads J dq = -N (p - target)
-        shift = problem.rcm.error + wanted
-        self._rcm.target = problem.p_WC + problem.rcm.normals.T @ shift
-        return [self._rcm]
+        return solve
+
+
+@compiled
+def mink_velocity(gains: Array, seen: Seen, memory: Array, out: Resolved) -> int:
+    """The answer of `MinkSolver`, projected on Omega; all but mink's own solve is done here.
+
+    Memory, written anew at every tick: the tip's target one period ahead (3,) [m], e_N + T v_rcm (2,) [m],
+    and mink's answer (n,) [rad/s].
+    """
+    law = gains[:LAW_SIZE].view(LAW)[0]
+    n, m = seen.q.size, 3 + seen.rows
+    J, v = scratch_matrix(m, n), scratch(m)
+    fill_task_rows(seen, law.k_tip, law.k_rcm, J, v)
+    for i in range(3):
+        memory[_TARGET + i] = seen.p_WT[i] + seen.dt_s * v[i]
+    for i in range(seen.rows):  # mink's row reads J dq = -N (p - target)
+        memory[_SHIFT + i] = seen.rcm_error[i] + seen.dt_s * v[3 + i]
+    _place(law, seen.q)
+    status = enter(gains)
+    if status != GOES_ON:
+        return status
+    answer(seen, memory[_QDOT:], J, v, out)
+    return GOES_ON
+
+
+@compiled
+def _place(law: Law, q: Array) -> None:
+    """What `mink.Configuration.update` does for tip and shaft, at `q` (n,) [rad]."""
+    qpos = vector(law.qpos, q.size)
+    for i in range(q.size):
+        qpos[i] = q[i]
+    mj_kinematics(law.mj_model, law.mj_data)
+    mj_comPos(law.mj_model, law.mj_data)
+
+
+def _examine(gains: Array, seen: Seen, memory: Array) -> Mapping[str, Array]:
+    """The rows that mink could not meet."""
+    law, m = laid_over(Law, gains), 3 + int(seen.rows)
+    J, v = np.zeros((m, seen.q.size)), np.zeros(m)
+    fill_task_rows(seen, law.k_tip, law.k_rcm, J, v)
+    return {"J": J, "v": v}

@@ -1,6 +1,6 @@
 """Policy: a callable that moves tip or joints, in place of a resolver."""
 
-from dataclasses import dataclass, replace
+import math
 from typing import Annotated, Any, Literal, Union
 
 import numpy as np
@@ -8,19 +8,28 @@ from numpy.typing import NDArray
 from pydantic import Field, PositiveFloat
 
 from surgsim.catalog import PartConfig
-from surgsim.columns import Block
-from surgsim.control.policies.asking import Asker, Held
+from surgsim.compiled import compiled
+from surgsim.control.inside import resolve_below
+from surgsim.control.joining import memory_size
+from surgsim.control.policies.asking import ACTION, Asker, ask, asking_gains
 from surgsim.control.policies.registry import find_policy
-from surgsim.control.problem import Resolution, VelocityProblem, bounded_resolution, stacked_rows
 from surgsim.control.redundancy import redundancy_needed
 from surgsim.control.resolvers import RESOLVERS
+from surgsim.control.resolvers.base import KernelResolver
 from surgsim.control.resolvers.pinv import PinvConfig
+from surgsim.control.resolvers.rows import answer, fill_task_rows
 from surgsim.models.arm import ArmModel
-from surgsim.tasks.base import TipCommand
+from surgsim.tick.algebra import times
+from surgsim.tick.arrays import Resolved, Seen
+from surgsim.tick.scratch import scratch, scratch_matrix
+from surgsim.tick.status import GOES_ON
 
 Array = NDArray[np.float64]
 _OTHERS = tuple(RESOLVERS.usable(name) for name in RESOLVERS.names() if name != "policy")
 AnyOtherResolver: Any = Annotated[Union[_OTHERS], Field(discriminator="type", title="resolver")]  # noqa: UP007
+_TIP_REF = ACTION + 3
+_BELOW = _TIP_REF + 3
+_KEPT = 15
 
 
 class PolicyConfig(PartConfig):
@@ -46,72 +55,114 @@ class PolicyConfig(PartConfig):
         """As much as the resolver of a tip velocity."""
         return redundancy_needed(self.resolver) if self.action == "tip_velocity" else 0
 
-    def build(self, arm: ArmModel) -> "PolicyResolver":
+    def build(self, arm: ArmModel) -> KernelResolver:
         """The resolver.
 
         Raises:
             SurgsimError: If there is no policy of this name.
         """
-        limit = np.full(3, self.tip_speed_max_m_per_s)
-        if self.action == "joint_velocity":
-            limit = arm.limits.velocity
-        asker = Asker(self.name, find_policy(self.name), limit, self.decimation)
-        return PolicyResolver(asker, self.resolver.build(arm) if self.action == "tip_velocity" else None)
+        policy, tip = find_policy(self.name), self.action == "tip_velocity"
+        limit = np.full(3, self.tip_speed_max_m_per_s) if tip else arm.limits.velocity
+        below: Any = self.resolver.build(arm) if tip else None
+        return KernelResolver(
+            kernel=follow_tip_velocity if tip else follow_joint_velocity,
+            arm=arm,
+            gains=asking_gains(self.decimation, limit),
+            memory_size=ACTION + limit.size + 3 + memory_size(below),
+            columns=tuple(getattr(below, "columns", ())),
+            inside=Asker(self.name, policy, limit.size),
+            below=below,
+        )
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class PolicyMemory:
-    """The tip reference p_WTd (3,) [m], the action that holds, and the inner resolver's memory."""
+@compiled
+def follow_tip_velocity(gains: Array, seen: Seen, memory: Array, out: Resolved) -> int:
+    """The policy takes the task's place: the resolver below, and the torque law, follow its motion.
 
-    p_WTd: Array
-    held: Held | None
-    inner: Any
+    With the action u, and p_ref from the tip at the start,
 
+        command := (p_ref, u, 0),  q' from the resolver below,  p_ref(k+1) = p_ref(k) + T u(k)
 
-class PolicyResolver:
-    """The policy takes the task's place: resolver and torque law below follow its motion.
-
-    With the action u, and p_ref from the measured tip at the start,
-
-        tip_velocity     command := (p_ref, u, 0),      q' from the inner resolver
-        joint_velocity   command := (p_ref, J_T q', 0), q' = P_Omega[u]
-        p_ref(k+1) = p_ref(k) + T v_ref(k)
-
-    `Resolution.command` hands the command on to the torque law. What the task asks for reaches them through
-    the policy alone.
-
-    Args:
-        asker: Asks the policy.
-        inner: Resolves a tip velocity; None for joint velocities.
+    What the task asks for reaches them through the policy alone. Memory: that of `ask`, p_ref (3,) [m], and
+    that of the resolver below.
     """
-
-    def __init__(self, asker: Asker, inner: Any) -> None:
-        self._asker = asker
-        self._inner = inner
-        self.columns: tuple[Block, ...] = tuple(getattr(inner, "columns", ()))
-
-    def start(self, problem: VelocityProblem) -> PolicyMemory:
-        """The reference is where the tip is; the policy has not been asked."""
-        self._asker.start()
-        return PolicyMemory(p_WTd=problem.kin.p_WT, held=None, inner=None)
-
-    def step(self, problem: VelocityProblem, memory: PolicyMemory) -> tuple[Resolution, PolicyMemory]:
-        """Joint velocities for one period, with the command that they follow."""
-        held = self._asker.ask(problem, memory.held)
-        inner = memory.inner
-        if self._inner is None:
-            J, v = stacked_rows(problem, 0.0, 0.0)
-            resolution = bounded_resolution(problem, held.action, J, v)
-            command = _moving(memory.p_WTd, problem.kin.Jv_WT @ resolution.qdot)
-        else:
-            command = _moving(memory.p_WTd, held.action)
-            asked = replace(problem, command=command)
-            if memory.held is None:
-                inner = self._inner.start(asked)
-            resolution, inner = self._inner.step(asked, inner)
-        after = command.p_WTd + problem.dt_s * command.v_WTd
-        return replace(resolution, command=command), PolicyMemory(p_WTd=after, held=held, inner=inner)
+    status = ask(gains, memory)
+    if status != GOES_ON:
+        return status
+    action, p_ref, below = memory[ACTION:_TIP_REF], memory[_TIP_REF:_BELOW], memory[_BELOW:]
+    _begin(seen, p_ref)
+    kept = scratch(_KEPT)
+    _keep_command(seen, kept)
+    _tell(seen, p_ref, action)
+    status = resolve_below(gains, seen, below, out)
+    if status != GOES_ON:  # what is seen stays as the resolver below saw it, for who looks into it
+        return status
+    _put_back(seen, kept)
+    _move_on(seen, p_ref, action, out)
+    return GOES_ON
 
 
-def _moving(p: Array, v: Array) -> TipCommand:
-    return TipCommand(p_WTd=p, v_WTd=v, a_WTd=np.zeros(3))
+@compiled
+def follow_joint_velocity(gains: Array, seen: Seen, memory: Array, out: Resolved) -> int:
+    """The policy takes the resolver's place: q' = P_Omega[u], and the torque law follows its motion.
+
+    With the action u, and p_ref from the tip at the start,
+
+        command := (p_ref, J_T q', 0),  p_ref(k+1) = p_ref(k) + T J_T q'(k)
+
+    Memory: that of `ask`, then p_ref (3,) [m].
+    """
+    status = ask(gains, memory)
+    if status != GOES_ON:
+        return status
+    n, m = seen.q.size, 3 + seen.rows
+    J, v, moved = scratch_matrix(m, n), scratch(m), scratch(3)
+    action, p_ref = memory[ACTION : ACTION + n], memory[ACTION + n : ACTION + n + 3]
+    _begin(seen, p_ref)
+    fill_task_rows(seen, 0.0, 0.0, J, v)
+    answer(seen, action, J, v, out)
+    times(seen.Jv_WT, out.qdot, moved)
+    _move_on(seen, p_ref, moved, out)
+    return GOES_ON
+
+
+@compiled
+def _begin(seen: Seen, p_ref: Array) -> None:
+    """The reference is at first where the tip is."""
+    if seen.first:
+        for i in range(3):
+            p_ref[i] = seen.p_WT[i]
+
+
+@compiled
+def _move_on(seen: Seen, p_ref: Array, v: Array, out: Resolved) -> None:
+    """The command for the torque law, and the reference of the next tick."""
+    for i in range(3):
+        out.p_WTd[i], out.v_WTd[i], out.a_WTd[i] = p_ref[i], v[i], 0.0
+        p_ref[i] += seen.dt_s * v[i]
+
+
+@compiled
+def _tell(seen: Seen, p: Array, v: Array) -> None:
+    """Have a tip's motion commanded, and nothing else."""
+    seen.roll_rate, seen.jaw, seen.budget_j = 0.0, 0.0, math.inf
+    for i in range(3):
+        seen.p_WTd[i], seen.v_WTd[i], seen.a_WTd[i], seen.budget_f_T[i] = p[i], v[i], 0.0, 0.0
+
+
+@compiled
+def _keep_command(seen: Seen, kept: Array) -> None:
+    """Keep the task's command (15,)."""
+    kept[0], kept[1], kept[2] = seen.roll_rate, seen.jaw, seen.budget_j
+    for i in range(3):
+        kept[3 + i], kept[6 + i], kept[9 + i] = seen.p_WTd[i], seen.v_WTd[i], seen.a_WTd[i]
+        kept[12 + i] = seen.budget_f_T[i]
+
+
+@compiled
+def _put_back(seen: Seen, kept: Array) -> None:
+    """Have the command that was kept."""
+    seen.roll_rate, seen.jaw, seen.budget_j = kept[0], kept[1], kept[2]
+    for i in range(3):
+        seen.p_WTd[i], seen.v_WTd[i], seen.a_WTd[i] = kept[3 + i], kept[6 + i], kept[9 + i]
+        seen.budget_f_T[i] = kept[12 + i]

@@ -18,6 +18,7 @@ from surgsim.control.resolvers.vprnn import (
     right_side,
     system,
 )
+from surgsim.control.seen import seen_of_velocity
 from surgsim.models.arm import ArmModel
 
 Array = NDArray[np.float64]
@@ -38,7 +39,7 @@ class Network:
 
     def __init__(self, config: VprnnConfig, arm: ArmModel, problem: VelocityProblem) -> None:
         self.resolver = config.build(arm)
-        seen, self._gains = self.resolver.seen(problem), self.resolver.gains
+        seen, self._gains = seen_of_velocity(problem, arm), self.resolver.gains
         m = network_size(self._gains, seen)
         self._J, v = np.empty((m, seen.q.size)), np.empty(m)
         fill_network_rows(self._gains, seen, self._J, v)

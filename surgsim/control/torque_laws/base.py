@@ -9,6 +9,8 @@ from numpy.typing import NDArray
 
 from surgsim.catalog import Surroundings
 from surgsim.control.failure import ControlFailure, failure_of
+from surgsim.control.inside import Inside
+from surgsim.control.joining import Desk, furnish
 from surgsim.control.problem import Resolution
 from surgsim.control.rcm import Rcm
 from surgsim.control.seen import dynamics_of, fill_kinematics, fill_rcm_of, kinematics_of, new_seen, rcm_of
@@ -18,6 +20,8 @@ from surgsim.plant.state import NO_FORCE
 from surgsim.tasks.base import TipCommand
 from surgsim.tasks.command import command_of, fill_command_of
 from surgsim.tick.arrays import Seen
+from surgsim.tick.fields import Fields
+from surgsim.tick.python_part import first_raised
 from surgsim.tick.status import GOES_ON
 
 Array = NDArray[np.float64]
@@ -115,9 +119,10 @@ class KernelTorqueLaw:
         kernel: status = kernel(gains, seen, memory, out); compiled, or plain Python.
         arm: The nominal arm.
         terms: Names of the terms, in the order of the rows of `out`.
-        gains: The law's numbers, laid out as the kernel says.
+        gains: The law's numbers, laid out as the kernel says; with something inside they begin with a `Head`.
         memory_size: Length of its memory, all zeros before the first tick.
         failures: What each status of the kernel means, for the person who reads the outcome.
+        inside: What the kernel enters in Python.
     """
 
     kernel: TorqueKernel
@@ -126,6 +131,7 @@ class KernelTorqueLaw:
     gains: Array
     memory_size: int = 0
     failures: Mapping[int, str] = field(default_factory=dict)
+    inside: Inside | None = None
 
     def start(self, problem: TorqueProblem) -> None:
         """The kernel makes its own memory at the first tick."""
@@ -135,14 +141,17 @@ class KernelTorqueLaw:
 
         Raises:
             ControlFailure: If the kernel has no answer.
+            BaseException: What a Python part inside it raised.
         """
         seen = seen_of_torque(problem, self.arm)
         seen.first = memory is None
         after = np.zeros(self.memory_size) if memory is None else memory.copy()
         out = np.zeros((len(self.terms), seen.q.size))
-        status = self.kernel(self.gains, seen, after, out)
+        desk = Desk(seen=seen, out=out, memory=after, limits=self.arm.limits, remembered={})
+        own = furnish(self, desk, "law")
+        status = self.kernel(own.gains, seen, after, out)
         if status != GOES_ON:
-            raise self.failure(status, seen)
+            raise first_raised(own.entered) or self.failure(status, seen)
         return out, after
 
     def failure(self, status: int, seen: Seen) -> ControlFailure:
@@ -187,22 +196,22 @@ def seen_of_torque(p: TorqueProblem, arm: ArmModel) -> Seen:
     return seen
 
 
-def torque_problem_of(seen: Seen, resolution: Resolution) -> TorqueProblem:
+def torque_problem_of(seen: Fields, resolution: Resolution) -> TorqueProblem:
     """What a torque law in Python is given."""
     return TorqueProblem(
-        t_s=float(seen.t_s),
-        dt_s=float(seen.dt_s),
-        q=seen.q.copy(),
-        v=seen.v.copy(),
-        tau_measured=seen.tau.copy(),
+        t_s=seen["t_s"].item(),
+        dt_s=seen["dt_s"].item(),
+        q=seen["q"].copy(),
+        v=seen["v"].copy(),
+        tau_measured=seen["tau"].copy(),
         kin=kinematics_of(seen),
         dyn=dynamics_of(seen),
         rcm=rcm_of(seen),
-        p_WC=seen.p_WC.copy(),
-        v_WC=seen.v_WC.copy(),
-        a_WC=seen.a_WC.copy(),
+        p_WC=seen["p_WC"].copy(),
+        v_WC=seen["v_WC"].copy(),
+        a_WC=seen["a_WC"].copy(),
         command=command_of(seen),
         resolution=resolution,
-        q_ref=seen.q_ref.copy(),
-        f_T=seen.f_T.copy(),
+        q_ref=seen["q_ref"].copy(),
+        f_T=seen["f_T"].copy(),
     )

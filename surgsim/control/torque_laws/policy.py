@@ -7,10 +7,13 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from surgsim.catalog import PartConfig
-from surgsim.control.policies.asking import Asker, Held
+from surgsim.compiled import compiled
+from surgsim.control.policies.asking import ACTION, Asker, ask, asking_gains
 from surgsim.control.policies.registry import find_policy
-from surgsim.control.torque_laws.base import TorqueProblem
+from surgsim.control.torque_laws.base import KernelTorqueLaw
 from surgsim.models.arm import ArmModel
+from surgsim.tick.arrays import Seen
+from surgsim.tick.status import GOES_ON
 
 Array = NDArray[np.float64]
 
@@ -29,35 +32,33 @@ class PolicyLawConfig(PartConfig):
     add_bias: bool = True
     decimation: Annotated[int, Field(ge=1, le=100_000)] = 1
 
-    def build(self, arm: ArmModel) -> "PolicyLaw":
+    def build(self, arm: ArmModel) -> KernelTorqueLaw:
         """The law.
 
         Raises:
             SurgsimError: If there is no policy of this name.
         """
-        asker = Asker(self.name, find_policy(self.name), arm.limits.torque, self.decimation)
-        return PolicyLaw(asker, self.add_bias)
+        limit = arm.limits.torque
+        return KernelTorqueLaw(
+            kernel=policy_torque,
+            arm=arm,
+            terms=("policy", "bias"),
+            gains=np.append(asking_gains(self.decimation, limit), float(self.add_bias)),
+            memory_size=ACTION + limit.size,
+            inside=Asker(self.name, find_policy(self.name), limit.size),
+        )
 
 
-class PolicyLaw:
-    """tau = u, or u + bias; u is the policy's action, cut at the torque limits.
+@compiled
+def policy_torque(gains: Array, seen: Seen, memory: Array, out: Array) -> int:
+    """Rows u and bias: tau = u, or u + bias, with u the policy's action, cut at the torque limits.
 
-    The resolver above it is not used; its answer is recorded.
+    The resolver above it is not used; its answer is recorded. The last gain says whether the bias is added.
     """
-
-    terms = ("policy", "bias")
-
-    def __init__(self, asker: Asker, add_bias: bool) -> None:
-        self._asker = asker
-        self._add_bias = add_bias
-
-    def start(self, problem: TorqueProblem) -> Held | None:
-        """The policy has not been asked."""
-        self._asker.start()
-        return None
-
-    def torque(self, problem: TorqueProblem, memory: Held | None) -> tuple[Array, Held]:
-        """Rows policy, bias (2, n) [N m]."""
-        held = self._asker.ask(problem, memory)
-        bias = problem.dyn.bias if self._add_bias else np.zeros_like(held.action)
-        return np.stack((held.action, bias)), held
+    status = ask(gains, memory)
+    if status != GOES_ON:
+        return status
+    for j in range(seen.q.size):
+        out[0, j] = memory[ACTION + j]
+        out[1, j] = seen.bias[j] if gains[gains.size - 1] != 0.0 else 0.0
+    return GOES_ON

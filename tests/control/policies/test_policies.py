@@ -1,6 +1,7 @@
 """Policies: their names, when they are asked, and what resolver and torque law make of them."""
 
 import sys
+import time
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -8,25 +9,23 @@ import numpy as np
 import pytest
 from usual_arm import usual_arm
 
+from surgsim.control.controller import ControllerConfig
 from surgsim.control.failure import ControlFailure
 from surgsim.control.policies import registry
-from surgsim.control.policies.asking import Asker
 from surgsim.control.policies.observation import observe
-from surgsim.control.policies.registry import find_policy, offering, policy_names, register_policy
+from surgsim.control.policies.registry import find_policy, offering, policy_names
 from surgsim.control.policies.shipped import damping, proportional
 from surgsim.control.resolvers.pinv import PinvConfig
 from surgsim.control.resolvers.policy import PolicyConfig
+from surgsim.control.seen import seen_of_velocity
 from surgsim.control.torque_laws.policy import PolicyLawConfig
 from surgsim.errors import Outcome, SurgsimError
 from surgsim.plugins import Offer
-from surgsim.simulate.loop import simulate
-
-
-@pytest.fixture
-def register(monkeypatch):
-    """`register_policy`, undone after the test."""
-    monkeypatch.setattr(registry, "_registered", {})
-    return register_policy
+from surgsim.scenario.load import load_scenario
+from surgsim.simulate.loop import Simulation, simulate
+from surgsim.simulate.setup import prepare
+from surgsim.tick import python_part
+from surgsim.tick.fields import fields_of
 
 
 def test_shipped_policies_are_found_by_name():
@@ -94,18 +93,41 @@ def test_an_offer_holds_within_its_block_alone():
         find_policy("agent")
 
 
-def test_an_observation_holds_copies(velocity_problem):
-    problem = velocity_problem(1)
-    q = problem.q.copy()
-    for value in observe(problem).values():
+def _observation(problem, arm):
+    return observe(fields_of(seen_of_velocity(problem, arm)))
+
+
+@pytest.mark.parametrize("trocar", [True, False])
+def test_an_observation_is_what_the_controller_sees(arm, velocity_problem, trocar):
+    p = velocity_problem(1, trocar=trocar, t_s=0.25)
+    found = _observation(p, arm)
+    wanted = {
+        "time": [0.25],
+        "joint_position": p.q,
+        "joint_velocity": p.v,
+        "tip_position": p.kin.p_WT,
+        "tip_error": p.kin.p_WT - p.command.p_WTd,
+        "command_velocity": p.command.v_WTd,
+        "command_acceleration": p.command.a_WTd,
+    }
+    if trocar:
+        wanted["rcm_error"], wanted["insertion_depth"] = p.rcm.error, [p.rcm.depth]
+        wanted["trocar_position"], wanted["trocar_velocity"] = p.p_WC, p.v_WC
+    assert list(found) == list(wanted)
+    for name, value in wanted.items():
+        np.testing.assert_array_equal(found[name], value)
+
+
+def test_an_observation_holds_copies(arm, velocity_problem):
+    seen = seen_of_velocity(velocity_problem(1), arm)
+    before = seen.copy()
+    for value in observe(fields_of(seen)).values():
         value[:] = np.nan
-    np.testing.assert_array_equal(problem.q, q)
-    assert np.isfinite(problem.command.v_WTd).all()
-    assert np.isfinite(problem.kin.p_WT).all()
+    assert seen.tobytes() == before.tobytes()
 
 
 class Counting:
-    """Counts its calls, and forgets them at a reset."""
+    """A policy that counts its calls, and forgets them at a reset."""
 
     def __init__(self):
         self.calls = 0
@@ -115,30 +137,104 @@ class Counting:
 
     def __call__(self, observation):
         self.calls += 1
-        return [float(self.calls), 0.0]
+        return [float(self.calls), 0.0, 0.0]
 
 
 @pytest.mark.parametrize("decimation", [1, 3])
-def test_a_policy_is_asked_once_in_a_while_and_reset_at_the_start(velocity_problem, decimation):
-    asker = Asker("counting", Counting(), np.array([2.5, 1.0]), decimation)
-    problem = velocity_problem(0)
+def test_a_policy_is_asked_once_in_a_while_and_reset_at_the_start(
+    arm, velocity_problem, register, decimation
+):
+    register("counting", Counting())
+    config = PolicyConfig(name="counting", tip_speed_max_m_per_s=2.5, decimation=decimation)
+    resolver, problem = config.build(arm), velocity_problem(0)
     for _ in range(2):
-        asker.start()
-        held, actions = None, []
+        memory, actions = resolver.start(problem), []
         for _ in range(9):
-            held = asker.ask(problem, held)
-            actions.append(held.action[0])
+            answer, memory = resolver.step(problem, memory)
+            actions.append(answer.command.v_WTd[0])
         wanted = [min(1.0 + k // decimation, 2.5) for k in range(9)]  # cut at the limit
         assert actions == wanted
 
 
-def test_an_action_must_have_its_shape_and_be_finite(velocity_problem):
-    problem, limit = velocity_problem(0), np.ones(3)
-    with pytest.raises(SurgsimError, match=r"policy 'p' gave an action of shape \(\), not \(3,\)"):
-        Asker("p", lambda _: 1.0, limit, 1).ask(problem, None)
+class Entries:
+    """Counts how often Python is entered from compiled code within the block."""
+
+    def __enter__(self):
+        self.count = 0
+        sys.setprofile(self._look)
+        return self
+
+    def __exit__(self, *_):
+        sys.setprofile(None)
+
+    def _look(self, frame, event, _):
+        self.count += event == "call" and frame.f_code.co_filename == python_part.__file__
+
+
+@pytest.mark.parametrize(
+    "parts",
+    [
+        {"resolver": {"type": "policy", "decimation": 7}, "torque_law": {"type": "joint_impedance"}},
+        {
+            "resolver": {"type": "policy", "name": "damping", "action": "joint_velocity", "decimation": 7},
+            "torque_law": {"type": "joint_impedance"},
+        },
+        {"resolver": {"type": "pinv"}, "torque_law": {"type": "policy", "decimation": 7}},
+    ],
+    ids=["tip velocity", "joint velocity", "torque"],
+)
+def test_python_is_entered_when_the_policy_is_due_and_not_while_its_action_holds(parts):
+    config = ControllerConfig.model_validate({"name": "asked", **parts})
+    simulation = Simulation(prepare(load_scenario("circle_panda", controller=config)))
+    for ticks, due in ((1, 1), (6, 0), (1, 1), (3, 0), (25, 4)):
+        with Entries() as entries:
+            simulation.advance(ticks)
+        assert entries.count == due
+    assert not simulation.ended
+
+
+@pytest.mark.parametrize(
+    ("action", "text"),
+    [
+        (1.0, r"\(\), not \(3,\)"),
+        (np.zeros(2), r"\(2,\), not \(3,\)"),
+        ([[0.0] * 3], r"\(1, 3\), not \(3,\)"),
+    ],
+)
+def test_an_action_must_have_its_shape(arm, velocity_problem, register, action, text):
+    register("p", lambda _: action)
+    with pytest.raises(SurgsimError, match=rf"policy 'p' gave an action of shape {text}"):
+        PolicyConfig(name="p").build(arm).step(velocity_problem(0), None)
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf])
+def test_an_action_must_be_finite(arm, velocity_problem, register, bad):
+    register("p", lambda _: [1.0, bad, 0.0])
     with pytest.raises(ControlFailure, match=r"policy 'p' gave .*not finite") as caught:
-        Asker("p", lambda _: [1.0, np.inf, 0.0], limit, 1).ask(problem, None)
+        PolicyConfig(name="p").build(arm).step(velocity_problem(0), None)
     assert caught.value.outcome is Outcome.DIVERGED
+
+
+def test_a_huge_action_is_cut_at_the_limit(arm, velocity_problem, register):
+    register("p", lambda _: [1e200, -1e200, 0.0])
+    answer, _ = PolicyConfig(name="p").build(arm).step(velocity_problem(0), None)
+    np.testing.assert_array_equal(answer.command.v_WTd, [0.1, -0.1, 0.0])
+
+
+def test_the_controller_s_time_has_that_of_the_policy_in_it(scenario, register):
+    """At least what the policy takes, in the ticks in which it is asked; every tick is timed."""
+
+    def busy(observation):
+        until = time.thread_time() + 0.002
+        while time.thread_time() < until:
+            pass
+        return np.zeros(3)
+
+    register("busy", busy)
+    asked = ("controller.resolver.name=busy", "controller.resolver.decimation=5", "task.duration_s=0.2")
+    took = simulate(scenario(*asked, controller="policy_proportional"))["control_time_s"]
+    assert np.isfinite(took).all()
+    assert (took[::5] >= 0.002).all()
 
 
 def test_a_tip_velocity_is_resolved_from_a_moving_reference(arm, velocity_problem):
@@ -146,11 +242,11 @@ def test_a_tip_velocity_is_resolved_from_a_moving_reference(arm, velocity_proble
     resolver = PolicyConfig().build(arm)
     inner = PinvConfig().build(usual_arm())
     first = velocity_problem(2)
-    v = proportional(observe(first))
+    v = proportional(_observation(first, arm))
     memory = resolver.start(first)
     p_ref = first.kin.p_WT
     for problem in (first, velocity_problem(3)):
-        v = proportional(observe(problem))
+        v = proportional(_observation(problem, arm))
         command = replace(problem.command, p_WTd=p_ref, v_WTd=v, a_WTd=np.zeros(3))
         wanted, _ = inner.step(replace(problem, command=command), None)
         answer, memory = resolver.step(problem, memory)

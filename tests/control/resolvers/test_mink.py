@@ -7,7 +7,7 @@ import pytest
 from usual_arm import usual_arm
 
 from surgsim.control.failure import ControlFailure
-from surgsim.control.resolvers.mink import Mink, MinkConfig
+from surgsim.control.resolvers.mink import MinkConfig
 from surgsim.control.resolvers.pinv import PinvConfig
 from surgsim.errors import Outcome
 from surgsim.simulate.loop import simulate
@@ -16,7 +16,7 @@ seeds = pytest.mark.parametrize("seed", range(5))
 
 
 def _mink(arm, p, **config):
-    resolver = Mink(MinkConfig(**config), arm)
+    resolver = MinkConfig(**config).build(arm)
     return resolver.step(p, resolver.start(p))[0]
 
 
