@@ -2,7 +2,7 @@
 
 import inspect
 from collections.abc import Callable
-from functools import update_wrapper
+from functools import cached_property, update_wrapper
 from typing import Any
 
 from numba import types
@@ -12,7 +12,6 @@ from numba.core.typeinfer import register_dispatcher
 
 from surgsim.compiled.cache import KernelCache
 from surgsim.compiled.library import KernelCompiler
-from surgsim.compiled.watch import declare
 
 _OPTIONS = {"nopython": True, "nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
 
@@ -70,11 +69,23 @@ class Within(_Form):
 class Kernel(_Form):
     """A compiled function as Python calls it: an entrance to the form `within`, which kernels call."""
 
-    def __init__(self, function: Callable[..., Any], within: Within | None = None) -> None:
-        self.within = within or Within(function)
-        super().__init__(function, _entrance(self.within))
-        if within is None:
-            declare()
+    def __init__(self, function: Callable[..., Any]) -> None:
+        super().__init__(function, function)
+        self._entered = False
+
+    @cached_property
+    def within(self) -> Within:
+        """The form that other kernels call."""
+        return Within(self.py_func)
+
+    def compile(self, sig: Any) -> Any:
+        """The entrance compiled for the types of `sig`."""
+        if not self._entered:  # most kernels are never called from Python
+            entrance = _entrance(self.within)
+            compiler = type(self._compiler)
+            self._compiler = compiler(entrance, self.targetdescr, self.targetoptions, {}, KernelCompiler)
+            self._cache, self._entered = KernelCache(self, entrance), True
+        return super().compile(sig)
 
     def get_call_template(self, args: Any, kws: Any) -> Any:
         """The template of a call from another kernel."""
@@ -90,7 +101,9 @@ class Kernel(_Form):
         return self.within.nopython_signatures
 
     def _again(self) -> "Kernel":
-        return Kernel(self.py_func, self.within)
+        other = Kernel(self.py_func)
+        other.within = self.within
+        return other
 
 
 def _entrance(within: Within) -> Callable[..., Any]:

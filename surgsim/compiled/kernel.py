@@ -12,6 +12,7 @@ from numba.extending import intrinsic, is_jitted
 from numba.extending import overload as overload_function
 
 from surgsim.compiled.dispatcher import Kernel
+from surgsim.compiled.watch import declare
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
@@ -26,6 +27,7 @@ def compiled(function: Function) -> Function:
     """
     if vars(numba.config)["DISABLE_JIT"]:  # numba is told to leave Python functions alone
         return function
+    declare()
     return cast(Function, Kernel(function))
 
 
