@@ -1,9 +1,7 @@
 """Worker processes that survive each other's death."""
 
 import multiprocessing
-import os
 import sys
-import threading
 import time
 from collections import deque
 from collections.abc import Iterator, Sequence
@@ -209,7 +207,6 @@ def record_failure(job: Job, name: str, detail: str) -> None:
 def _serve(pipe: Connection) -> None:
     """A worker's life: jobs in, outcomes out, until the pipe closes or the parent is gone."""
     obey_parent()
-    threading.Thread(target=_die_with_parent, daemon=True).start()
     with suppress(OSError):
         pipe.send(("ready", ""))
 
@@ -229,11 +226,3 @@ def _serve(pipe: Connection) -> None:
         except OSError:
             break
     leave_in_peace()
-
-
-def _die_with_parent() -> None:
-    """End at once when the parent does, so that a resumed batch never meets an old worker."""
-    parent = multiprocessing.parent_process()
-    if parent is not None:
-        parent.join()
-        os._exit(1)

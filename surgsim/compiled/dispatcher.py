@@ -74,7 +74,7 @@ class Kernel(_Form):
         self._entered = False
 
     @cached_property
-    def within(self) -> Within:
+    def within(self) -> Any:
         """The form that other kernels call."""
         return Within(self.py_func)
 
@@ -82,8 +82,9 @@ class Kernel(_Form):
         """The entrance compiled for the types of `sig`."""
         if not self._entered:  # most kernels are never called from Python
             entrance = _entrance(self.within)
-            compiler = type(self._compiler)
-            self._compiler = compiler(entrance, self.targetdescr, self.targetoptions, {}, KernelCompiler)
+            compiler = type(vars(self)["_compiler"])
+            options = self.targetoptions
+            vars(self)["_compiler"] = compiler(entrance, self.targetdescr, options, {}, KernelCompiler)
             self._cache, self._entered = KernelCache(self, entrance), True
         return super().compile(sig)
 

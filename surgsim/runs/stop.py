@@ -1,5 +1,7 @@
 """Signals that end a command in order: every draft is removed on the way out."""
 
+import multiprocessing
+import os
 import signal
 import sys
 import threading
@@ -63,9 +65,20 @@ def stopping_in_order() -> Iterator[None]:
 
 
 def obey_parent() -> None:
-    """In a worker process: Ctrl-C is the parent's to handle; its SIGTERM ends the run under way in order."""
+    """In a worker process: Ctrl-C is the parent's to handle; its SIGTERM ends the run under way in order.
+
+    The worker ends at once when its parent does, so that a resumed batch never meets an old one.
+    """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, _leave)
+    threading.Thread(target=_die_with_parent, daemon=True).start()
+
+
+def _die_with_parent() -> None:
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        parent.join()
+        os._exit(1)
 
 
 def leave_in_peace() -> None:

@@ -2,7 +2,6 @@
 
 import hashlib
 import json
-import os
 import sys
 import zipfile
 from collections.abc import Iterator
@@ -13,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from surgsim.recording.files import replacing
 from surgsim.runs.provenance import provenance
 from surgsim.runs.sources import package_sha256
 from surgsim.studies.study import Case, Measured
@@ -24,11 +24,9 @@ def write_measured(folder: Path, measured: Measured) -> None:
     """Keep a measured case in the folder, whole or not at all."""
     folder.mkdir(parents=True, exist_ok=True)
     path = _path(folder, measured.case)
-    draft = path.with_suffix(f".{os.getpid()}.draft")
     arrays: dict[str, Any] = {_ROW: np.array(json.dumps(dict(measured.row))), **measured.curves}
-    with draft.open("wb") as file:
+    with replacing(path) as draft, draft.open("wb") as file:
         np.savez(file, **arrays)
-    draft.replace(path)
 
 
 def read_measured(folder: Path, case: Case) -> Measured | None:
@@ -48,7 +46,7 @@ def kept_until_whole(study: Path) -> Iterator[Path]:
     place = study.resolve()
     folder = place.parent / f".{place.name}.cases"
     yield folder
-    for path in (*folder.glob("*.npz"), *folder.glob("*.draft")):
+    for path in folder.glob("*.npz"):
         path.unlink()
     with suppress(OSError):  # it was not needed, or holds what is not ours
         folder.rmdir()

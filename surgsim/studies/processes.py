@@ -1,7 +1,6 @@
 """Do the same thing with many values in several processes, each told of and ended in order."""
 
 import multiprocessing
-import os
 import threading
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
@@ -65,11 +64,3 @@ def _begin(told: Any) -> None:
     global _told
     _told = told
     obey_parent()
-    threading.Thread(target=_die_with_parent, daemon=True).start()
-
-
-def _die_with_parent() -> None:
-    parent = multiprocessing.parent_process()
-    if parent is not None:
-        parent.join()
-        os._exit(1)
