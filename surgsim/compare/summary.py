@@ -136,4 +136,4 @@ def _least(metric: Metric, matters: float) -> str:
         return ""
     words, unit = heading_of(metric)
     source = f"that is {metric.matters_source}" if matters == metric.matters else "set for this batch"
-    return f"Differences of {words} below {exactly(matters, unit)} count as none; {source}."
+    return f"By {words}, controllers less than {exactly(matters, unit)} apart count as equal; {source}."
