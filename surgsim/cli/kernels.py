@@ -79,7 +79,7 @@ class _Shown:
         return f"compiling kernels{once}: {self._done} of at most {self._most}"
 
     def _line(self, told: Compiling) -> str:
-        first = f"compiling kernels (once): about {self._most}, {_HOW_LONG}"
+        first = f"compiling kernels (once): at most {self._most}, {_HOW_LONG}"
         return self._text(told) if told.awaited or self._said else first
 
     def _count(self, told: Compiling, now: float) -> None:

@@ -53,10 +53,11 @@ def print_run(trace: "Trace", metrics: Mapping[str, float | None]) -> None:
 
     scenario, ending = trace.meta.scenario, trace.meta.ending
     print_metrics(f"{scenario['name']}, {scenario['controller']['name']}, seed {scenario['seed']}", metrics)
-    detail = f" {ending.detail}." if ending.detail else ""
+    sentence = ending.outcome.value.removesuffix(".")
+    detail = f" ({ending.detail})" if ending.detail else ""
     print()
     print_prose(judge(trace, metrics).line())
-    print_prose(f"{ending.outcome.name.lower()} at {ending.t_s:.3f} s: {ending.outcome.value}{detail}")
+    print_prose(f"{ending.outcome.name.lower()} at {ending.t_s:.3f} s: {sentence}{detail}.")
 
 
 @contextmanager
