@@ -8,6 +8,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from surgsim.compiling import Compiling, listening
+from surgsim.display import count
 
 _PATIENCE_S = 3.0
 _EVERY_S = 180.0
@@ -67,10 +68,17 @@ class _Shown:
             self._said, self._next_s = True, now + _EVERY_S
 
     def _show(self, told: Compiling) -> None:
-        """Write over the line of before, and not before the cache has said that nothing is kept."""
+        """Write over the line of before, and not before the cache has said that nothing is kept.
+
+        Where no kernel is under way the line is empty, for what a command may print then.
+        """
         if self._kept or self._done:
             self._said = True
-            (_screens[-1] if _screens else _overwrite)(self._text(told))
+            text = self._text(told)
+            if _screens:
+                _screens[-1](text)
+            else:
+                _overwrite(text if self._under_way or told.awaited else "")
 
     def _text(self, told: Compiling) -> str:
         if told.awaited:
@@ -94,8 +102,7 @@ class _Shown:
     def end(self) -> None:
         """On a terminal, put what was done in the place of the line, if there was one."""
         if self._said and self._terminal:
-            kernels = "kernel" if self._done == 1 else "kernels"
-            text = f"compiled {self._done} {kernels} in {self._took_s:.0f} s{_where(self._began_at)}\n"
+            text = f"compiled {count(self._done, 'kernel')} in {self._took_s:.0f} s{_where(self._began_at)}\n"
             print("\r\x1b[K" + (text if self._done else ""), end="", file=sys.stderr, flush=True)
 
 
@@ -111,12 +118,12 @@ def _place_to_keep() -> Path | None:
 
 
 def _where(began_at: float) -> str:
-    """Whether the next start finds kernels of this one, which began at `began_at`, seconds of the epoch."""
+    """Where what was compiled since `began_at`, seconds of the epoch, is kept; empty if nowhere."""
     from surgsim.compiled.places import places
 
     for place in places():
         with suppress(OSError):
             if any(entry.stat().st_mtime >= began_at for entry in place.glob("*.nbi")):
                 temporary = Path(tempfile.gettempdir()) in place.parents
-                return "; kept among the temporary files" if temporary else "; the next start finds them"
+                return "; kept among the temporary files" if temporary else "; kept for the next start"
     return ""

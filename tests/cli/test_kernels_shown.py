@@ -86,10 +86,9 @@ def test_one_line_on_a_terminal(capsys, monkeypatch, place):
     clear = "\r\x1b[K"
     head = "compiling kernels (once): "
     assert capsys.readouterr().err == (
-        f"{clear}{head}0 of at most 7{clear}{head}1 of at most 7"
-        f"{clear}{head}1 of at most 7{clear}{head}2 of at most 7"
+        f"{clear}{head}0 of at most 7{clear}{clear}{head}1 of at most 7{clear}"
         f"<{head}2 of at most 7>\n<{head}3 of at most 7>\n<{head}3 of at most 7>\n<{head}4 of at most 7>\n"
-        f"{clear}compiled 4 kernels in 0 s; the next start finds them\n"
+        f"{clear}compiled 4 kernels in 0 s; kept for the next start\n"
     )
 
 
