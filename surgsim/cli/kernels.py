@@ -12,7 +12,7 @@ from surgsim.display import count
 
 _PATIENCE_S = 3.0
 _EVERY_S = 180.0
-_HOW_LONG = "a minute or two"
+_MANY = 100
 _screens: list[Callable[[str], None]] = []
 
 
@@ -87,8 +87,10 @@ class _Shown:
         return f"compiling kernels{once}: {self._done} of at most {self._most}"
 
     def _line(self, told: Compiling) -> str:
-        first = f"compiling kernels (once): at most {self._most}, {_HOW_LONG}"
-        return self._text(told) if told.awaited or self._said else first
+        if told.awaited or self._said:
+            return self._text(told)
+        how_long = "a minute or two" if self._most > _MANY else "less than a minute"
+        return f"compiling kernels (once): at most {self._most}, {how_long}"
 
     def _count(self, told: Compiling, now: float) -> None:
         """Add to the kernels, and to the time in which one of them at least was under way."""

@@ -61,7 +61,15 @@ def test_one_line_in_a_log(capsys, place, clock):
     with compiling_shown():
         for _ in range(40):
             compile_two()
-    assert capsys.readouterr() == ("", "compiling kernels (once): at most 7, a minute or two\n")
+    assert capsys.readouterr() == ("", "compiling kernels (once): at most 7, less than a minute\n")
+
+
+def test_how_long_many_take(capsys, place, clock):
+    clock(4.0)
+    with compiling_shown():
+        for ended in (False, True):
+            tell(Compiling(kernel="a", most=185, ended=ended))
+    assert capsys.readouterr().err == "compiling kernels (once): at most 185, a minute or two\n"
 
 
 def test_what_takes_longer_than_the_line_said_gets_another_one(capsys, place, clock):
@@ -70,7 +78,7 @@ def test_what_takes_longer_than_the_line_said_gets_another_one(capsys, place, cl
         compile_two()
         compile_two()
     assert capsys.readouterr().err == (
-        "compiling kernels (once): at most 7, a minute or two\n"
+        "compiling kernels (once): at most 7, less than a minute\n"
         "compiling kernels (once): 2 of at most 7\n"
         "compiling kernels (once): 3 of at most 7\n"
         "compiling kernels (once): 4 of at most 7\n"
