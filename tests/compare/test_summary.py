@@ -48,8 +48,8 @@ def test_nobody_wins_where_nothing_sets_them_apart(runs_of):
     found = told(runs_of({"a": seeds(1.0), "b": seeds(1.01)}, matters=0.1))
     assert found.winners == ()
     assert found.first == (
-        "Nobody wins by tip error, RMS: no controller is told apart. First and last: too few pairs: one "
-        "seed. Seen: −0.0100 mm, less than 0.1 mm."
+        "Nobody wins by tip error, RMS: no controller is told apart. a against b, first and last: too few "
+        "pairs (one seed). Seen: −0.0100 mm, less than 0.1 mm."
     )
 
 
