@@ -2,6 +2,7 @@
 
 import json
 import os
+import shutil
 import subprocess
 import sys
 import zipfile
@@ -21,7 +22,7 @@ def call(*command: object, cwd: Path, **variables: str) -> str:
         env={**os.environ, **variables},
         capture_output=True,
         text=True,
-        timeout=120,
+        timeout=240,
     )
     assert done.returncode == 0, f"{command}: exit {done.returncode}\n{done.stdout}\n{done.stderr}"
     return done.stdout
@@ -51,16 +52,24 @@ def test_it_holds_every_module_asset_and_scenario(wheel: Path) -> None:
     assert not [name for name in packed if name.startswith(("tests/", "docs/")) or "__pycache__" in name]
 
 
-def test_it_runs_a_shipped_scenario_by_name_from_anywhere(wheel: Path, tmp_path: Path) -> None:
-    target, elsewhere = tmp_path / "installed", tmp_path / "elsewhere"
-    elsewhere.mkdir()
-    call(*PIP, "install", "--no-index", "--no-deps", "--target", target, wheel, cwd=elsewhere)
+@pytest.fixture(scope="module")
+def installed(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder that the wheel is installed into, with what kernels the checkout has of the same sources."""
+    target = tmp_path_factory.mktemp("installed")
+    call(*PIP, "install", "--no-index", "--no-deps", "--target", target, wheel, cwd=target)
+    kernels = Path("surgsim", "__pycache__", "kernels")
+    (target / kernels).mkdir(parents=True)
+    for kernel in (ROOT / kernels).glob("*.nbi"):
+        shutil.copy(kernel, target / kernels)
+    return target
 
+
+def test_it_runs_a_shipped_scenario_by_name_from_anywhere(installed: Path, tmp_path: Path) -> None:
     def python(*words: str) -> str:
-        return call(sys.executable, "-W", "error", *words, cwd=elsewhere, PYTHONPATH=str(target))
+        return call(sys.executable, "-W", "error", *words, cwd=tmp_path, PYTHONPATH=str(installed))
 
     place = python("-c", "import surgsim; print(surgsim.__file__)").strip()
-    assert Path(place).is_relative_to(target)
+    assert Path(place).is_relative_to(installed)
     listed = json.loads(python("-m", "surgsim", "list", "scenarios", "--json"))
     assert {item["name"] for item in listed} == {
         *(path.stem for path in (ROOT / "scenarios").glob("*.yaml")),
@@ -69,4 +78,59 @@ def test_it_runs_a_shipped_scenario_by_name_from_anywhere(wheel: Path, tmp_path:
     short = ("--set", "task.duration_s=2", "--set", "task.hold_end_s=0")
     text = python("-m", "surgsim", "run", "circle_lwr4plus", "--no-record", "--json", "--out", "run", *short)
     assert json.loads(text)["outcome"]["t_s"] == pytest.approx(2.5)
-    assert sorted(path.name for path in (elsewhere / "run").iterdir()) == ["metrics.json", "scenario.yaml"]
+    assert sorted(path.name for path in (tmp_path / "run").iterdir()) == ["metrics.json", "scenario.yaml"]
+
+
+PROJECT = """
+[build-system]
+requires = ["hatchling"]
+build-backend = "hatchling.build"
+
+[project]
+name = "mylab-resolvers"
+version = "0.1.0"
+
+[project.entry-points."surgsim.resolvers"]
+mylab = "mylab:Config"
+
+[tool.hatch.build.targets.wheel]
+only-include = ["mylab.py"]
+"""
+MODULE = '''
+"""A resolver of somebody else's."""
+from typing import Literal
+from surgsim.control.resolvers.pinv import PinvConfig
+
+class Config(PinvConfig):
+    """As the pseudo-inverse."""
+    type: Literal["mylab"] = "mylab"
+'''
+
+
+@pytest.mark.parametrize(
+    ("fault", "status", "said"),
+    [
+        ("", 0, "mylab-resolvers: 1 part, 10 checks, none broken"),
+        ("raise RuntimeError('no lab today')", 1, "of the package mylab-resolvers 0.1.0 does not load"),
+    ],
+    ids=["whole", "broken"],
+)
+def test_it_tests_a_part_of_another_wheel(
+    installed: Path, tmp_path: Path, fault: str, status: int, said: str
+) -> None:
+    source, lab = tmp_path / "mylab", tmp_path / "lab"
+    source.mkdir()
+    (source / "pyproject.toml").write_text(PROJECT, encoding="utf-8")
+    (source / "mylab.py").write_text(MODULE + fault, encoding="utf-8")
+    alone = ("--no-index", "--no-build-isolation", "--no-deps")
+    call(*PIP, "install", *alone, "--target", lab, source, cwd=tmp_path)
+    done = subprocess.run(
+        [sys.executable, "-W", "error", "-m", "surgsim", "test-part", "mylab-resolvers"],
+        cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(map(str, (installed, lab)))},
+        capture_output=True,
+        text=True,
+        timeout=240,
+    )
+    assert done.returncode == status, done.stdout + done.stderr
+    assert said in " ".join(done.stdout.split())

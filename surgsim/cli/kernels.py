@@ -1,20 +1,24 @@
 """What a person sees while kernels are compiled: how many, once, and how long it took; all on stderr."""
 
 import sys
+import tempfile
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
+from pathlib import Path
 
 from surgsim.compiling import Compiling, listening
+from surgsim.display import count
 
 _PATIENCE_S = 3.0
-_EVERY_S = 5.0
+_EVERY_S = 180.0
+_MANY = 100
 _screens: list[Callable[[str], None]] = []
 
 
 @contextmanager
 def compiling_shown() -> Iterator[None]:
-    """Show kernels that are compiled meanwhile, and at the end how many there were; else nothing."""
+    """Show kernels that are compiled meanwhile, and on a terminal at the end how many there were."""
     shown = _Shown()
     try:
         with listening(shown):
@@ -34,32 +38,59 @@ def on_screen(show: Callable[[str], None]) -> Iterator[None]:
 
 
 class _Shown:
-    """Counts kernels: a line that is written over on a terminal, else one every few seconds."""
+    """Counts kernels: a line that is written over on a terminal, else one, and more only if it takes long.
+
+    Where no folder can keep kernels the cache says so itself, in a line that is enough for a log.
+    """
 
     def __init__(self) -> None:
         self._done = self._most = self._under_way = 0
         self._began_s = self._took_s = 0.0
-        self._last_s: float | None = None
+        self._next_s: float | None = None
+        self._began_at = time.time()
+        self._kept = True
         self._said = False
         self._terminal = sys.stderr.isatty()
 
     def __call__(self, told: Compiling) -> None:
         now = time.perf_counter()
-        if self._last_s is None:
-            self._last_s = now + _PATIENCE_S - _EVERY_S
+        if self._next_s is None:
+            self._next_s = now + _PATIENCE_S
+            self._kept = _place_to_keep() is not None
         if not told.awaited:
             self._count(told, now)
-            text = f"compiling kernels (once): {self._done} of at most {self._most}"
         elif self._under_way:  # of a worker that another one keeps waiting
             return
-        else:
-            text = "waiting for kernels that another process compiles"
         if self._terminal:
+            self._show(told)
+        elif now >= self._next_s and self._kept:
+            print(self._line(told), file=sys.stderr, flush=True)
+            self._said, self._next_s = True, now + _EVERY_S
+
+    def _show(self, told: Compiling) -> None:
+        """Write over the line of before, and not before the cache has said that nothing is kept.
+
+        Where no kernel is under way the line is empty, for what a command may print then.
+        """
+        if self._kept or self._done:
             self._said = True
-            (_screens[-1] if _screens else _overwrite)(text)
-        elif now - self._last_s >= _EVERY_S:
-            self._said, self._last_s = True, now
-            print(text, file=sys.stderr, flush=True)
+            text = self._text(told)
+            if _screens:
+                _screens[-1](text)
+            else:
+                _overwrite(text if self._under_way or told.awaited else "")
+
+    def _text(self, told: Compiling) -> str:
+        if told.awaited:
+            return "waiting for kernels that another process compiles"
+        once = " (once)" if self._kept else ""
+        return f"compiling kernels{once}: {self._done} of at most {self._most}"
+
+    def _line(self, told: Compiling) -> str:
+        if told.awaited or self._said:
+            return self._text(told)
+        how_long = "a minute or two" if self._most > _MANY else "less than a minute"
+        return f"compiling kernels (once): at most {self._most}, {how_long}"
 
     def _count(self, told: Compiling, now: float) -> None:
         """Add to the kernels, and to the time in which one of them at least was under way."""
@@ -71,15 +102,30 @@ class _Shown:
         self._most = max(self._most, told.most, self._done)
 
     def end(self) -> None:
-        """Say what was done, if anything was said before."""
-        clear = "\r\x1b[K" if self._said and self._terminal else ""
-        if self._said and not self._done:
-            print(clear, end="", file=sys.stderr, flush=True)
-        elif self._said:
-            kernels = "kernel" if self._done == 1 else "kernels"
-            text = f"compiled {self._done} {kernels} in {self._took_s:.0f} s; the next start finds them"
-            print(clear + text, file=sys.stderr, flush=True)
+        """On a terminal, put what was done in the place of the line, if there was one."""
+        if self._said and self._terminal:
+            text = f"compiled {count(self._done, 'kernel')} in {self._took_s:.0f} s{_where(self._began_at)}\n"
+            print("\r\x1b[K" + (text if self._done else ""), end="", file=sys.stderr, flush=True)
 
 
 def _overwrite(text: str) -> None:
     print(f"\r\x1b[K{text}", end="", file=sys.stderr, flush=True)
+
+
+def _place_to_keep() -> Path | None:
+    """The folder that kernels are kept in; None if there is none."""
+    from surgsim.compiled.places import places, prepared
+
+    return next((place for place in places() if prepared(place)), None)
+
+
+def _where(began_at: float) -> str:
+    """Where what was compiled since `began_at`, seconds of the epoch, is kept; empty if nowhere."""
+    from surgsim.compiled.places import places
+
+    for place in places():
+        with suppress(OSError):
+            if any(entry.stat().st_mtime >= began_at for entry in place.glob("*.nbi")):
+                temporary = Path(tempfile.gettempdir()) in place.parents
+                return "; kept among the temporary files" if temporary else "; kept for the next start"
+    return ""

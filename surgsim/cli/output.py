@@ -53,10 +53,11 @@ def print_run(trace: "Trace", metrics: Mapping[str, float | None]) -> None:
 
     scenario, ending = trace.meta.scenario, trace.meta.ending
     print_metrics(f"{scenario['name']}, {scenario['controller']['name']}, seed {scenario['seed']}", metrics)
-    detail = f" {ending.detail}." if ending.detail else ""
+    sentence = ending.outcome.value.removesuffix(".")
+    detail = f" ({ending.detail})" if ending.detail else ""
     print()
     print_prose(judge(trace, metrics).line())
-    print_prose(f"{ending.outcome.name.lower()} at {ending.t_s:.3f} s: {ending.outcome.value}{detail}")
+    print_prose(f"{ending.outcome.name.lower()} at {ending.t_s:.3f} s: {sentence}{detail}.")
 
 
 @contextmanager
@@ -184,8 +185,8 @@ def print_leaderboard(metric: str, rows: "Sequence[LeaderboardRow]", points: int
         if figure.value is None:
             return "-"
         if figure.low is None or figure.high is None:
-            return number(figure.value)
-        return f"{number(figure.value)} [{number(figure.low)}, {number(figure.high)}]"
+            return number(figure.value, 3)
+        return f"{number(figure.value, 3)} [{number(figure.low, 3)}, {number(figure.high, 3)}]"
 
     from surgsim.compare.failures import counted_outcomes
     from surgsim.metrics.catalog import METRICS
@@ -195,10 +196,10 @@ def print_leaderboard(metric: str, rows: "Sequence[LeaderboardRow]", points: int
         failed = ", ".join(filter(None, (counted_outcomes(row.failures), undone))) or "none"
         place = str(row.place or "-")
         rank = number(row.rank.value, 3)
-        return (place, row.controller, failed, str(row.runs), interval(row.value), rank)
+        return (row.controller, place, failed, str(row.runs), interval(row.value), rank)
 
     table = [cells(row) for row in rows]
-    header = ("place", "controller", "failed", "runs", "IQM [95 %]", "mean rank")
+    header = ("controller", "place", "failed", "runs", "IQM [95 %]", "mean rank")
     pooled = f", all {points} points of the grid pooled" if points > 1 else ""
     title = f"{METRICS[metric].heading}; who is not told apart shares a place{pooled}"
-    print_table(title, header, table, right=(0, 3, 4, 5))
+    print_table(title, header, table, right=(1, 3, 4, 5))

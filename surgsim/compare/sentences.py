@@ -58,9 +58,9 @@ def _too_few(a: str, b: str, metric: Metric, pairs: Pairs, difference: Interval)
     reason = difference.note.removesuffix(": no interval")
     if abs(value) < pairs.matters or value == 0.0:
         least = f", less than {exactly(pairs.matters, unit)}{_still(pairs)}" if value else ""
-        return f"Too few pairs: {reason}. Seen: {with_unit(value, unit)}{least}."
+        return f"Too few pairs ({reason}). Seen: {with_unit(value, unit)}{least}."
     seen = f"{a} {side(metric, value)} than {b} by {with_unit(abs(value), unit)}{_unless(pairs, value)}"
-    return f"Too few pairs: {reason}. Seen: {seen}."
+    return f"Too few pairs ({reason}). Seen: {seen}."
 
 
 def _unless(pairs: Pairs, value: float) -> str:

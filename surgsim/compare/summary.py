@@ -68,7 +68,8 @@ def _first(runs: Observations, metric: Metric, rows: Sequence[LeaderboardRow]) -
             return (), f"{valued[0].controller} alone has a value of {words}: {value}."
         last = compare_pair(runs, valued[0].controller, valued[-1].controller, metric.name)
         finding = last.sentence[0].lower() + last.sentence[1:]
-        return (), f"Nobody wins by {words}: no controller is told apart. First and last: {finding}"
+        pair = f"{last.a} against {last.b}, first and last"
+        return (), f"Nobody wins by {words}: no controller is told apart. {pair}: {finding}"
     found = compare_pair(runs, winners[0], others[0].controller, metric.name)
     sharing = sum(row.place == others[0].place for row in others) - 1
     told = _by_how_much(found, metric, runs.matters(metric.name), len(winners) > 1, sharing)
@@ -136,4 +137,4 @@ def _least(metric: Metric, matters: float) -> str:
         return ""
     words, unit = heading_of(metric)
     source = f"that is {metric.matters_source}" if matters == metric.matters else "set for this batch"
-    return f"Differences of {words} below {exactly(matters, unit)} count as none; {source}."
+    return f"By {words}, controllers less than {exactly(matters, unit)} apart count as equal; {source}."

@@ -4,6 +4,7 @@ import html
 import os
 import re
 from collections.abc import Iterable, Sequence
+from itertools import pairwise
 from pathlib import Path
 from urllib.parse import quote
 
@@ -19,6 +20,11 @@ def escape(text: object) -> str:
 def breakable(name: str) -> str:
     """A name that may be broken after its underscores."""
     return escape(name).replace("_", "_<wbr>")
+
+
+def heading(words: str) -> str:
+    """Words with a unit in brackets, which is not broken."""
+    return re.sub(r"\[.*\]", lambda unit: unit[0].replace(" ", "\N{NO-BREAK SPACE}"), escape(words))
 
 
 def paragraph(text: str, classes: str = "") -> str:
@@ -41,6 +47,13 @@ def table(caption: str, head: Iterable[str], rows: Iterable[Sequence[str]], clas
         f'<div class="scroll {classes}" tabindex="0" role="region" aria-label="{escape(caption)}">'
         f"<table><thead><tr>{top}</tr></thead>\n<tbody>{body}</tbody></table></div>"
     )
+
+
+def groups(items: Sequence[str], most: int) -> list[Sequence[str]]:
+    """`items` in as few groups of at most `most` as there can be, of nearly the same size."""
+    count = -(-len(items) // most)
+    bounds = [len(items) * k // count for k in range(count + 1)] if count else []
+    return [items[low:high] for low, high in pairwise(bounds)]
 
 
 def _cell(cell: str) -> str:

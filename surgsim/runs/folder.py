@@ -146,11 +146,23 @@ def whole_folder(folder: Path) -> Iterator[Path]:
         make_folder(place.parent)
         restore(place)
         with draft_of(place) as draft:
-            yield draft
+            with _named(draft, folder):
+                yield draft
             sync_tree(draft)
             put_in_place(draft, place)
     except OSError as error:
         raise SurgsimError(f"cannot write {folder}: {error.strerror or error}") from error
+
+
+@contextmanager
+def _named(draft: Path, folder: Path) -> Iterator[None]:
+    """Have errors name the folder that a person asked for, not the draft that is gone when they are read."""
+    try:
+        yield
+    except SurgsimError as error:
+        if str(draft) not in str(error):
+            raise
+        raise SurgsimError(str(error).replace(str(draft), str(folder))) from error
 
 
 def summary_of_result(scenario: Scenario, result: RunResult) -> dict[str, Any]:

@@ -62,7 +62,7 @@ def test_a_run_that_ends_early_exits_1_and_is_written_all_the_same(surgsim, tmp_
     done = surgsim("run", "circle_lwr4plus", "--no-record", *_set(*SHORT, "safety.tip_error_max_m=1e-9"))
     assert done.returncode == 1
     assert "tip_limit at 0.00" in done.stdout
-    assert "The tip left its path by more than the stated limit. tip 0.00 mm from its command" in done.stdout
+    assert "The tip left its path by more than the stated limit (tip 0.00 mm from its command" in done.stdout
     summary = json.loads((tmp_path / "runs/circle_lwr4plus/vprnn-seed0/metrics.json").read_text())
     assert summary["outcome"]["name"] == "tip_limit"
 

@@ -1,5 +1,9 @@
 """What a person sees of kernels that are compiled: nothing when they are there."""
 
+import itertools
+import os
+import re
+import subprocess
 import sys
 import time
 
@@ -7,7 +11,7 @@ import pytest
 
 from surgsim.cli import kernels
 from surgsim.cli.kernels import compiling_shown, on_screen
-from surgsim.compiled import watch
+from surgsim.compiled import places, watch
 from surgsim.compiling import Compiling, tell
 
 
@@ -17,32 +21,71 @@ def compile_two():
             tell(Compiling(kernel=name, most=7, ended=ended))
 
 
+@pytest.fixture
+def place(monkeypatch, tmp_path):
+    """The only folder for kernels: no temporary one, with one that was just compiled."""
+    place = tmp_path / "kernels"
+    place.mkdir(mode=0o700)
+    (place / "a.nbi").touch()
+    os.utime(place / "a.nbi", (time.time() + 60.0,) * 2)
+    monkeypatch.setattr(places, "places", lambda: (place,))
+    monkeypatch.setattr(kernels.tempfile, "gettempdir", lambda: "/nowhere")
+    return place
+
+
+@pytest.fixture
+def clock(monkeypatch):
+    """Sets the seconds that pass from one look at the clock to the next."""
+
+    def every(step_s):
+        now = itertools.count(0.0, step_s)
+        monkeypatch.setattr(kernels.time, "perf_counter", lambda: next(now))
+
+    return every
+
+
 def test_a_warm_start_shows_nothing(capsys):
     with compiling_shown():
         pass
     assert capsys.readouterr() == ("", "")
 
 
-def test_short_waits_are_not_worth_a_line_in_a_log(capsys):
+def test_short_waits_are_not_worth_a_line_in_a_log(capsys, place):
     with compiling_shown():
         compile_two()
     assert capsys.readouterr() == ("", "")
 
 
-def test_lines_in_a_log(capsys, monkeypatch):
-    now = iter(range(0, 400, 4))
-    monkeypatch.setattr(kernels.time, "perf_counter", lambda: float(next(now)))
+def test_one_line_in_a_log(capsys, place, clock):
+    clock(1.0)
+    with compiling_shown():
+        for _ in range(40):
+            compile_two()
+    assert capsys.readouterr() == ("", "compiling kernels (once): at most 7, less than a minute\n")
+
+
+def test_how_long_many_take(capsys, place, clock):
+    clock(4.0)
+    with compiling_shown():
+        for ended in (False, True):
+            tell(Compiling(kernel="a", most=185, ended=ended))
+    assert capsys.readouterr().err == "compiling kernels (once): at most 185, a minute or two\n"
+
+
+def test_what_takes_longer_than_the_line_said_gets_another_one(capsys, place, clock):
+    clock(100.0)
     with compiling_shown():
         compile_two()
-    assert capsys.readouterr() == (
-        "",
-        "compiling kernels (once): 1 of at most 7\n"
+        compile_two()
+    assert capsys.readouterr().err == (
+        "compiling kernels (once): at most 7, less than a minute\n"
         "compiling kernels (once): 2 of at most 7\n"
-        "compiled 2 kernels in 8 s; the next start finds them\n",
+        "compiling kernels (once): 3 of at most 7\n"
+        "compiling kernels (once): 4 of at most 7\n"
     )
 
 
-def test_one_line_on_a_terminal(capsys, monkeypatch):
+def test_one_line_on_a_terminal(capsys, monkeypatch, place):
     monkeypatch.setattr(sys.stderr, "isatty", lambda: True, raising=False)
     with compiling_shown():
         compile_two()
@@ -51,11 +94,76 @@ def test_one_line_on_a_terminal(capsys, monkeypatch):
     clear = "\r\x1b[K"
     head = "compiling kernels (once): "
     assert capsys.readouterr().err == (
-        f"{clear}{head}0 of at most 7{clear}{head}1 of at most 7"
-        f"{clear}{head}1 of at most 7{clear}{head}2 of at most 7"
+        f"{clear}{head}0 of at most 7{clear}{clear}{head}1 of at most 7{clear}"
         f"<{head}2 of at most 7>\n<{head}3 of at most 7>\n<{head}3 of at most 7>\n<{head}4 of at most 7>\n"
-        f"{clear}compiled 4 kernels in 0 s; the next start finds them\n"
+        f"{clear}compiled 4 kernels in 0 s; kept for the next start\n"
     )
+
+
+def test_what_is_kept_among_temporary_files_is_not_promised(capsys, monkeypatch, place, tmp_path):
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True, raising=False)
+    monkeypatch.setattr(kernels.tempfile, "gettempdir", lambda: str(tmp_path))
+    with compiling_shown():
+        compile_two()
+    assert capsys.readouterr().err.endswith("compiled 2 kernels in 0 s; kept among the temporary files\n")
+
+
+def test_kernels_that_a_full_disk_did_not_take_are_not_promised(capsys, monkeypatch, place):
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True, raising=False)
+    (place / "a.nbi").unlink()
+    with compiling_shown():
+        compile_two()
+    assert capsys.readouterr().err.endswith("compiled 2 kernels in 0 s\n")
+
+
+NOWHERE = """
+import sys
+from pathlib import Path
+from surgsim.cli import kernels
+from surgsim.compiled import cache, places
+
+cache.places = places.places = lambda: (Path({place!r}),)
+kernels._PATIENCE_S = 0.0
+sys.path.insert(0, {folder!r})
+with kernels.compiling_shown():
+    import doubled
+    print(doubled.twice(1.0), doubled.thrice(1.0))
+"""
+DOUBLED = """from surgsim.compiled import compiled
+
+@compiled
+def twice(x):
+    return 2.0 * x
+
+@compiled
+def thrice(x):
+    return 3.0 * x
+"""
+
+
+@pytest.fixture
+def nowhere(tmp_path):
+    """A program that compiles two kernels where no folder can be written, and what it says of that."""
+    (tmp_path / "file").write_bytes(b"")
+    (tmp_path / "doubled.py").write_text(DOUBLED, encoding="utf-8")
+    place = tmp_path / "file" / "kernels"
+    why = f"surgsim: kernels are compiled at every start: none of these folders can be written: {place}"
+    return NOWHERE.format(place=str(place), folder=str(tmp_path)), why
+
+
+def test_where_nothing_can_be_kept_a_log_has_one_line(nowhere):
+    program, why = nowhere
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=100)
+    assert (done.stdout, done.stderr) == ("2.0 3.0\n", f"{why}\n")
+
+
+def test_where_nothing_can_be_kept_a_terminal_promises_nothing(nowhere, terminal):
+    program, why = nowhere
+    done = terminal(sys.executable, "-c", program, columns=400).wait()
+    assert done.lines[0] == why
+    assert "compiling kernels: 1 of at most 2" in done.lines
+    assert "once" not in done.text
+    assert any(re.fullmatch(r"compiled 2 kernels in \d+ s", line) for line in done.lines), done.text
 
 
 def test_waiting_for_another_process_is_said_unless_workers_wait_for_each_other(capsys, monkeypatch):

@@ -60,8 +60,8 @@ def test_a_mean_that_does_not_matter_names_the_scenarios_in_which_it_does(runs_o
 def test_one_seed_says_what_was_seen_and_no_interval(runs_of):
     runs = runs_of({"a": one(1.0), "b": one(1.05), "c": one(4.0)}, matters=0.1)
     near, far = (compare_pair(runs, "a", name, TIP) for name in "bc")
-    assert near.sentence == "Too few pairs: one seed. Seen: −0.0500 mm, less than 0.1 mm."
-    assert far.sentence == "Too few pairs: one seed. Seen: a better than c by 3.00 mm."
+    assert near.sentence == "Too few pairs (one seed). Seen: −0.0500 mm, less than 0.1 mm."
+    assert far.sentence == "Too few pairs (one seed). Seen: a better than c by 3.00 mm."
     assert (near.improvement.value, far.improvement.value) == (0.5, 1.0)
     assert far.improvement.low is None
 

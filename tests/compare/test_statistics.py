@@ -75,8 +75,8 @@ def test_missing_pairs_and_undefined_values_are_named(runs_of):
 @pytest.mark.parametrize(
     ("a", "b", "sentence"),
     [
-        (line(1.0, 2.0), line(2.0, 2.5), "Too few pairs: only 2 seeds. Seen: a better than b by 0.750 mm."),
-        (line(1.0), line(2.0), "Too few pairs: one seed. Seen: a better than b by 1.00 mm."),
+        (line(1.0, 2.0), line(2.0, 2.5), "Too few pairs (only 2 seeds). Seen: a better than b by 0.750 mm."),
+        (line(1.0), line(2.0), "Too few pairs (one seed). Seen: a better than b by 1.00 mm."),
         (line("diverged"), line(2.0), "Too few pairs: none (1 a failed). Failed: a 1, b 0 of 1 pairs."),
         ({}, line(2.0), "Too few pairs: none (1 run of a missing)."),
     ],

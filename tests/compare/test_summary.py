@@ -48,8 +48,8 @@ def test_nobody_wins_where_nothing_sets_them_apart(runs_of):
     found = told(runs_of({"a": seeds(1.0), "b": seeds(1.01)}, matters=0.1))
     assert found.winners == ()
     assert found.first == (
-        "Nobody wins by tip error, RMS: no controller is told apart. First and last: too few pairs: one "
-        "seed. Seen: −0.0100 mm, less than 0.1 mm."
+        "Nobody wins by tip error, RMS: no controller is told apart. a against b, first and last: too few "
+        "pairs (one seed). Seen: −0.0100 mm, less than 0.1 mm."
     )
 
 
@@ -74,10 +74,10 @@ def test_a_controller_that_fails_does_not_win_by_the_runs_that_it_completed(runs
 def test_what_does_not_matter_is_said_with_its_source(runs_of):
     runs = replace(runs_of({"a": seeds(1.0)}), smallest={})
     assert told(runs).least.startswith(
-        "Differences of tip error, RMS below 0.1 mm count as none; that is how well the arms come back"
+        "By tip error, RMS, controllers less than 0.1 mm apart count as equal; that is how well the arms come"
     )
     assert told(replace(runs, smallest={TIP: 0.3})).least.endswith(
-        "0.3 mm count as none; set for this batch."
+        "less than 0.3 mm apart count as equal; set for this batch."
     )
     assert told(replace(runs, smallest={TIP: 0.0})).least == ""
 

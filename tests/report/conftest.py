@@ -5,9 +5,12 @@ import importlib.util
 import io
 from pathlib import Path
 
+import numpy as np
+import pyarrow.parquet as pq
 import pytest
 from PIL import Image
 
+from surgsim.metrics.catalog import METRICS
 from surgsim.report import scenes
 from surgsim.report.scenes import SceneView
 
@@ -47,6 +50,24 @@ def view(picture: str | None = PIXEL) -> SceneView:
         path=((0.0, 0.55, 0.0), (0.02, 0.55, 0.0)),
         picture=picture,
     )
+
+
+@pytest.fixture(scope="session")
+def wide_results(made_results, tmp_path_factory):
+    """A results directory of twelve controllers with long names, each with every metric."""
+    rng = np.random.default_rng(3)
+    given = pq.read_table(made_results() / "runs.parquet").to_pylist()
+    rows = []
+    for row in (row for row in given if row["seed"] < 6):
+        for k in range(3):
+            size = 10.0 ** rng.uniform(-4.0, 4.0)
+            there = {name: row[name] if row[name] is not None else size * rng.random() for name in METRICS}
+            folder = f"{row['folder']}-{k}"
+            named = {"controller": f"{row['controller']}_{k}", "folder": folder, "run_id": folder}
+            rows.append({**row, **there, **named})
+    root = tmp_path_factory.mktemp("wide")
+    _MODULE.write_results(root, rows)
+    return root
 
 
 @pytest.fixture

@@ -1,10 +1,12 @@
 """The page in a real browser: headless Chromium, from disk."""
 
+import io
 import re
 import shutil
 
 import left_out
 import pytest
+from PIL import Image
 from playwright import sync_api as playwright
 
 from surgsim.report.write import write_report
@@ -53,6 +55,11 @@ CONTRAST = """() => {
   return found;
 }"""
 
+OPEN_ALL = "document.querySelectorAll('details').forEach(d => d.open = true)"
+CUT_OFF = """() => [...document.querySelectorAll('.scroll')]
+  .filter(box => box.scrollWidth > box.clientWidth)
+  .map(box => `${box.ariaLabel}: ${box.scrollWidth} of ${box.clientWidth}`)"""
+
 
 @pytest.fixture(scope="module")
 def browser():
@@ -92,10 +99,10 @@ def open_page(browser):
 
 def column(page, name, board=".main"):
     """Numbers of a column of the leaderboard, from top to bottom; None where there is none."""
-    index = page.locator(f"{board} thead th").evaluate_all(
-        "(cells, name) => cells.findIndex((cell) => cell.firstChild.dataset.name === name)", name
-    )
-    cells = page.locator(f"{board} tbody tr > :nth-child({index + 1})")
+    button = page.locator(f'button[data-name="{name}"]')
+    index = button.evaluate("button => button.parentElement.cellIndex")
+    table = page.locator(f"{board} table").filter(has=button)
+    cells = table.locator(f"tbody tr > :nth-child({index + 1})")
     return [float(v) if v else None for v in cells.evaluate_all("cells => cells.map(c => c.dataset.value)")]
 
 
@@ -138,12 +145,57 @@ def test_names_sort_as_text(open_page, address):
 @pytest.mark.parametrize("width", [320, 390, 1280])
 def test_nothing_overflows_sideways(open_page, address, width):
     page = open_page(address, viewport={"width": width, "height": 844})
-    page.evaluate("document.querySelectorAll('details').forEach(d => d.open = true)")
+    page.evaluate(OPEN_ALL)
     assert page.evaluate("document.documentElement.scrollWidth") == width
     wide = page.locator("main > section").evaluate_all("all => all.map(s => s.getBoundingClientRect().right)")
     assert max(wide) <= width
     board = page.locator(".main").evaluate("box => [box.scrollWidth, box.clientWidth]")
     assert (board[0] > board[1]) == (width < 1000)  # on a phone the table scrolls inside its box
+
+
+@pytest.fixture(scope="module")
+def wide_address(wide_results):
+    return write_report(wide_results).resolve().as_uri()
+
+
+@pytest.mark.parametrize("width", [1280, 1600])
+def test_no_table_is_cut_off_on_a_desktop(open_page, wide_address, width):
+    page = open_page(wide_address, viewport={"width": width, "height": 900})
+    page.evaluate(OPEN_ALL)
+    assert page.evaluate("document.documentElement.scrollWidth") == width
+    assert page.locator(".board").count() > 5
+    assert page.evaluate(CUT_OFF) == []
+
+
+def test_no_table_is_cut_off_on_paper(open_page, wide_address):
+    between_margins = 687  # of A4 with 14 mm on both sides
+    page = open_page(wide_address, viewport={"width": between_margins, "height": 900})
+    page.emulate_media(media="print")
+    page.evaluate(OPEN_ALL)
+    assert page.evaluate("document.documentElement.scrollWidth") == between_margins
+    rights = page.locator("table").evaluate_all("all => all.map(t => t.getBoundingClientRect().right)")
+    assert len(rights) > 20
+    assert max(rights) <= between_margins
+    # A browser prints the headings of a table again on the next sheet, but leaves out what buttons paint.
+    shown = page.locator(".board button").evaluate_all("all => all.map(b => getComputedStyle(b).display)")
+    assert set(shown) == {"contents"}
+    assert not page.locator("#leaderboard .printed").is_visible()  # it would deny what stands above it
+
+
+def test_a_shade_tells_that_a_table_goes_on(open_page, wide_address):
+    page = open_page(wide_address, viewport={"width": 390, "height": 844})
+    page.evaluate(OPEN_ALL)
+    box = page.locator(".board").first
+    assert box.evaluate("box => box.scrollWidth > box.clientWidth")
+
+    def darkness():
+        """Of the right edge, of a line just above the bottom that no text reaches."""
+        shot = Image.open(io.BytesIO(box.screenshot())).convert("L")
+        return 255 - shot.getpixel((shot.width - 3, shot.height - 12))
+
+    assert darkness() > 30
+    box.evaluate("box => box.scrollLeft = box.scrollWidth")
+    assert darkness() < 5
 
 
 def test_text_in_figures_can_be_read_on_a_phone(open_page, address):

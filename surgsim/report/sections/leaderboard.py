@@ -41,7 +41,7 @@ def leaderboard_section(results: Results, boards: Boards) -> str:
     rest = [name for name in results.metrics if name not in results.headline]
     others = html.details(
         f"{len(rest)} more metrics",
-        _board(results, boards, rest, "board all", places=False),
+        *(_board(results, boards, group, "board all", places=False) for group in html.groups(rest, _ABREAST)),
         small=", ".join(METRICS[name].heading.partition(" [")[0] for name in rest[:4]) + ", …",
     )
     table = _board(results, boards, results.headline, "board main", places=True)
@@ -49,6 +49,9 @@ def leaderboard_section(results: Results, boards: Boards) -> str:
         "leaderboard", "Leaderboard", html.paragraph(note), table, others if rest else "", _PRINTED, _LIVE
     )
 
+
+_ABREAST = 6
+"""Columns of metrics beside each other that a sheet of paper has room for."""
 
 _PRINTED = '<p class="printed">Printed: the main metrics. All of them are in runs.csv.</p>'
 _LIVE = '<p class="unseen" id="sorted" aria-live="polite"></p>'
@@ -78,7 +81,8 @@ def _board(results: Results, boards: Boards, metrics: Sequence[str], classes: st
         counts.append(_heading("mean rank", "mean rank", "1 is best", "number", "ascending"))
         figures = [place, figures[0], *counts, *figures[1:]]
     head += figures
-    return html.table("Leaderboard" if places else "Leaderboard, more metrics", head, rows, classes)
+    caption = "Leaderboard" if places else f"Leaderboard: {', '.join(METRICS[m].heading for m in metrics)}"
+    return html.table(caption, head, rows, classes)
 
 
 def _metric_heading(name: str) -> str:
@@ -96,7 +100,7 @@ def _heading(
     return (
         f'<th scope="col" aria-sort="{sort}"><button type="button" data-kind="{kind}" data-first="{first}" '
         f'data-name="{html.escape(name)}" data-words="{html.escape(words)}" title="{html.escape(title)}">'
-        f"{html.escape(words)}{small}</button></th>"
+        f"{html.heading(words)}{small}</button></th>"
     )
 
 

@@ -16,6 +16,9 @@ from surgsim.report.sections.frontier import frontiers
 from surgsim.report.sections.pairs import comparison_table
 from surgsim.report.series import COLUMNS, Series
 
+_ABREAST = 8
+"""Controllers beside each other that a sheet of paper has room for."""
+
 
 def scenarios_section(results: Results, series: Mapping[str, Series]) -> str:
     """A table of the main metric over scenarios, and everything about each one, folded."""
@@ -37,15 +40,21 @@ def _overview(results: Results) -> str:
     if not results.metrics:
         return ""
     main, runs = results.headline[0], results.runs
-    head = ["scenario", *(html.swatch(k) + html.breakable(c) for k, c in enumerate(runs.controllers))]
-    rows = []
-    for name in runs.scenarios:
-        mine = [runs.of_scenario(name).of_controller(controller) for controller in runs.controllers]
-        rows.append([f'<th scope="row">{html.breakable(name)}</th>', *(_median(one, main) for one in mine)])
     note = html.paragraph(
         f"Medians of {METRICS[main].heading} over completed runs; unfold one for its figures."
     )
-    return note + html.table("Scenarios", head, rows, "fails")
+    abreast = html.groups(runs.controllers, _ABREAST)
+    return note + "".join(_medians(runs, main, controllers) for controllers in abreast)
+
+
+def _medians(runs: Observations, metric: str, controllers: Sequence[str]) -> str:
+    """A table: a row for each scenario, a column for each controller."""
+    marks = [html.swatch(runs.controllers.index(name)) + html.breakable(name) for name in controllers]
+    rows = []
+    for name in runs.scenarios:
+        mine = [runs.of_scenario(name).of_controller(controller) for controller in controllers]
+        rows.append([f'<th scope="row">{html.breakable(name)}</th>', *(_median(one, metric) for one in mine)])
+    return html.table(f"Scenarios: {', '.join(controllers)}", ["scenario", *marks], rows, "fails")
 
 
 def _median(runs: Observations, metric: str) -> str:

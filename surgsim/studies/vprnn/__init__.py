@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from functools import partial
 from itertools import product
 
+from surgsim.display import count
 from surgsim.studies.study import Claim, Groups, Judged, Printed, Results, Study, holds, in_all
 from surgsim.studies.tables import Row, Tables, number, numbers, pick, span
 from surgsim.studies.vprnn import cases, networks, page
@@ -148,7 +149,7 @@ def _theorem(tables: Tables) -> Judged:
         for name in ("linear", "saturated at 1")
     )
     return holds(falls and closed < 1e-9 and check < 1e-6), (
-        f"V falls at every step from {len(rows)} random starts; delta(0) exp(-beta(exp(t) - 1)) to "
+        f"V falls at every step from {count(len(rows), 'random start')}; delta(0) exp(-beta(exp(t) - 1)) to "
         f"{closed:.0e}, Runge-Kutta to {check:.0e}; 1 % after {linear} ms, saturated {saturated} "
         "ms; for eq. (27) in continuous time, not for the tip: k1, k2 and the torque law set its rate"
     )
@@ -176,7 +177,7 @@ def _euler(tables: Tables) -> Judged:
     ended = all(row["outcome"] == wanted[str(row["integration"])] for row in tables["euler_arm"])
     ends = ", ".join(f"{row['plant']} plant at {number(row, 'end_s'):.2f} s" for row in arm)
     return holds(max(abs(x) for x in off) < EULER_S and ended), (
-        f"delta grows from {span(off, 2)} s after that time for {len(off)} pairs of T and beta; "
+        f"delta grows from {span(off, 2)} s after that time for {count(len(off), 'pair')} of T and beta; "
         f"with Table I at 1 kHz the run ends as diverged: {ends}"
     )
 
@@ -185,7 +186,7 @@ def _steady_state(tables: Tables) -> Judged:
     rows = tables["network_rates"]
     vprnn, rnn = (max(numbers(rows, f"{name}_end_deviation")) for name in ("vprnn", "rnn"))
     return holds(max(vprnn, rnn) < 1e-9), (
-        f"VPRNN to {vprnn:.0e}, RNN to {rnn:.0e}, from {len(rows)} random states: "
+        f"VPRNN to {vprnn:.0e}, RNN to {rnn:.0e}, from {count(len(rows), 'random state')}: "
         "h2, h3 and h4 vanish where the rows are met"
     )
 
@@ -209,7 +210,7 @@ def _ours_under_disturbance(tables: Tables) -> Judged:
         shares += [number(row, column) / number(vprnn, column) for column in ("tip_max_mm", "rcm_max_mm")]
     tip, rcm = (max(numbers(rows, column)) for column in ("tip_max_mm", "rcm_max_mm"))
     return holds(max(shares) <= SHARE), (
-        f"{span([100.0 * x for x in shares], 2)} % of VPRNN's in {len(rows)} cells of the ladder; "
+        f"{span([100.0 * x for x in shares], 2)} % of VPRNN's in {count(len(rows), 'cell')} of the ladder; "
         f"at most {tip:.3g} mm (tip) and {rcm:.3g} mm (RCM)"
     )
 
