@@ -81,4 +81,10 @@ METRICS = (
         meaning="RMS of the velocity rows that the resolver left unmet, m/s",
         compute=resolver_residual_rms,
     ),
+    Metric(
+        name="infeasible_ticks",
+        heading="ticks without a command",
+        meaning="ticks in which the controller found no command",
+        compute=lambda trace: float(np.sum(trace["infeasible"] == 1.0)),
+    ),
 )

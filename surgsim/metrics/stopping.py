@@ -15,12 +15,6 @@ def stop_distance_mm(trace: Trace) -> float:
 
 METRICS = (
     Metric(
-        name="infeasible_ticks",
-        heading="ticks without a command",
-        meaning="ticks in which the controller found no command",
-        compute=lambda trace: float(np.sum(trace["infeasible"] == 1.0)),
-    ),
-    Metric(
         name="stop_distance_mm",
         heading="distance until stopped [mm]",
         matters=0.1,
