@@ -28,8 +28,9 @@ def number(value: float | None, digits: int = 4) -> str:
 
 
 def count(amount: int, noun: str) -> str:
-    """An amount with its noun, e.g. `1 run`, `2 runs`."""
-    return f"{amount} {noun}{'' if amount == 1 else 's'}"
+    """An amount with its noun, e.g. `1 run`, `2 runs`, `3 pushes`."""
+    ending = "" if amount == 1 else "es" if noun.endswith("sh") else "s"
+    return f"{amount} {noun}{ending}"
 
 
 def text_table(header: Sequence[str], rows: Sequence[Sequence[str]], right: Collection[int] = ()) -> str:

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from functools import partial
 
+from surgsim.display import count
 from surgsim.studies.passive_teleoperation import page
 from surgsim.studies.passive_teleoperation.cases import (
     GRIPS,
@@ -97,8 +98,9 @@ def _planes(tables: Tables) -> Judged | None:
             inside = over <= OVERSHOOT_MM and slack > number(row, "slack_free_max_mm_per_s")
             return holds(inside and row["outcome"] == "completed" and rcm <= _RCM_MM), (
                 f"a plane acts in {number(row, 'planes_percent'):.0f} % of the ticks and begins to "
-                f"act {number(row, 'plane_contacts'):g} times; tip at most {over:.3g} mm past it, slack up "
-                f"to {slack:.3g} mm/s, RCM error at most {rcm:.2g} mm; {row['outcome']}"
+                f"act {count(round(number(row, 'plane_contacts')), 'time')}; "
+                f"tip at most {over:.3g} mm past it, slack up to {slack:.3g} mm/s, "
+                f"RCM error at most {rcm:.2g} mm; {row['outcome']}"
             )
     return None
 
@@ -119,7 +121,7 @@ def _tanks(tables: Tables) -> Judged:
     rows, pushed = tables["scenarios"], numbers(pick(tables["pushes"], passivity="tank"), "tank_min_j")
     deficit = max(numbers(rows, "deficit_j"))
     positive = min([*numbers(rows, "tank_min_j"), *pushed]) > 0.0 and deficit <= ENERGY_TOLERANCE_J
-    low = f", {min(pushed):.3g} J over {len(pushed)} pushes" if pushed else ""
+    low = f", {min(pushed):.3g} J over {count(len(pushed), 'push')}" if pushed else ""
     return holds(positive), (
         f"lowest level: {_each(rows, 'tank_min_j', ' J')}{low}; taken from an empty tank: "
         f"{deficit:.3g} J; the floor is 0.01 J"
@@ -149,8 +151,9 @@ def _any_delay(tables: Tables) -> Judged | None:
     )
     stable = in_all([row not in unstable for row in rows])
     return stable if passive else "does not hold", (
-        f"{len(rows)} pushes at {span(numbers(rows, 'delay_ms'), 4)} ms: never more energy delivered than "
-        f"the tanks held at first: {'yes' if passive else 'no'} (at most {beyond:.3g} J beyond). "
+        f"{count(len(rows), 'push')} at {span(numbers(rows, 'delay_ms'), 4)} ms: "
+        f"never more energy delivered than the tanks held at first: {'yes' if passive else 'no'} "
+        f"(at most {beyond:.3g} J beyond). "
         f"Unstable in {len(unstable)}: {cells or 'none'}"
     )
 
@@ -177,7 +180,7 @@ def _active(grip: str, tables: Tables) -> Judged | None:
     where = ": " + ", ".join(f"{place} {delay} ms" for place, delay in places) if places else ""
     some: Verdict = "depends" if active or unstable else "does not hold"
     return "holds" if len(unstable) == len(rows) else some, (
-        f"delivers more than 1 mJ in {active} of {len(rows)} pushes, up to {max(delivered):.3g} J; "
+        f"delivers more than 1 mJ in {active} of {count(len(rows), 'push')}, up to {max(delivered):.3g} J; "
         f"unstable in {len(unstable)}{where}"
     )
 
@@ -190,7 +193,7 @@ def _contact(tables: Tables) -> Judged | None:
     better = rests == len(tank) and not others
     most, other = (max(numbers(rows, "contact_deviation_n")) for rows in (tank, tdpa))
     return "holds" if better else "depends" if rests > others else "does not hold", (
-        f"rests in {rests} of {len(tank)} pushes with the tank, in {others} of {len(tdpa)} "
+        f"rests in {rests} of {count(len(tank), 'push')} with the tank, in {others} of {len(tdpa)} "
         f"with tdpa; deviation of the force at most {most:.3g} and {other:.3g} N"
     )
 
