@@ -1,6 +1,6 @@
 """Worker processes that survive each other's death."""
 
-import multiprocessing
+import os
 import sys
 import time
 from collections import deque
@@ -16,11 +16,11 @@ from surgsim.compiling import Compiling, listening, tell
 from surgsim.errors import SurgsimError
 from surgsim.runs.drafts import clear_drafts
 from surgsim.runs.stop import held_back, leave_in_peace, obey_parent
+from surgsim.runs.workers import worker_context
 
 TRIES = 2
 _MOST_STILLBORN = 5
 _PATIENCE_S = 10.0
-_SPAWN = multiprocessing.get_context("spawn")
 
 
 @dataclass
@@ -79,11 +79,15 @@ class _Pool:
 
     def hire(self) -> None:
         """Start a process, and give it the next job."""
-        here, there = _SPAWN.Pipe()
-        process = _SPAWN.Process(target=_serve, args=(there,), daemon=True)
+        context = worker_context()
+        here, there = context.Pipe()
+        process: Any = context.Process(target=_serve, args=(there, dict(os.environ)), daemon=True)
         # Ctrl-C reaches every process of a terminal: not one that cannot take it yet.
-        with held_back(), _script_hidden():
-            process.start()
+        try:
+            with held_back(), _script_hidden():
+                process.start()
+        except (OSError, EOFError) as error:
+            raise SurgsimError(f"a worker process cannot begin: {error}") from error
         there.close()
         worker = _Worker(process, here)
         self.workers.append(worker)
@@ -204,9 +208,9 @@ def record_failure(job: Job, name: str, detail: str) -> None:
         raise stopped(str(error)) from error
 
 
-def _serve(pipe: Connection) -> None:
+def _serve(pipe: Connection, environment: dict[str, str]) -> None:
     """A worker's life: jobs in, outcomes out, until the pipe closes or the parent is gone."""
-    obey_parent()
+    obey_parent(environment)
     with suppress(OSError):
         pipe.send(("ready", ""))
 

@@ -1,6 +1,7 @@
 """Do the same thing with many values in several processes, each told of and ended in order."""
 
 import multiprocessing
+import os
 import threading
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
@@ -8,6 +9,7 @@ from typing import Any, TypeVar
 
 from surgsim.compiling import listening, tell
 from surgsim.runs.stop import obey_parent
+from surgsim.runs.workers import worker_context
 
 A = TypeVar("A")
 B = TypeVar("B")
@@ -26,11 +28,13 @@ def in_processes(function: Callable[[A], B], values: Sequence[A], count: int) ->
     if count < 2:
         yield from map(function, values)
         return
-    spawn, others = multiprocessing.get_context("spawn"), set(multiprocessing.active_children())
-    told = spawn.Queue()
+    context, others = worker_context(), set(multiprocessing.active_children())
+    told = context.Queue()
     listener = threading.Thread(target=_tell_all, args=(told,), daemon=True)
     listener.start()
-    pool = ProcessPoolExecutor(count, mp_context=spawn, initializer=_begin, initargs=(told,))
+    pool = ProcessPoolExecutor(
+        count, mp_context=context, initializer=_begin, initargs=(told, dict(os.environ))
+    )
     try:
         yield from pool.map(_Called(function), values)
     except BaseException:
@@ -59,8 +63,8 @@ def _tell_all(told: Any) -> None:
         tell(compiling)
 
 
-def _begin(told: Any) -> None:
+def _begin(told: Any, environment: dict[str, str]) -> None:
     """The beginning of a worker: signals are its parent's to handle, and it does not outlive it."""
     global _told
     _told = told
-    obey_parent()
+    obey_parent(environment)
