@@ -87,7 +87,7 @@ class KernelCache(_Cache):
             if entry is not None and self._may_be_kept(data):
                 _write(entry, _content(data))
                 data.library.entry = entry
-                _RESULTS[entry] = data
+                _RESULTS[entry] = data._replace(metadata=None)  # as if it had been loaded
         finally:
             lock = self._locks.pop(sig, None)
             if lock is not None:

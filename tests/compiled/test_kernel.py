@@ -5,7 +5,7 @@ from time import perf_counter
 import numpy as np
 import pytest
 
-from surgsim.compiled import address_of, as_parameter, library, watch
+from surgsim.compiled import address_of, as_parameter, compiled, library, watch
 
 BY_ADDRESS = """
 from numba import types
@@ -145,6 +145,16 @@ def test_a_caller_is_compiled_again_where_what_it_calls_by_name_is_gone(workshop
     assert "large" in workshop.compiled
     assert workshop.run("user").twice(30.5) == expected
     assert workshop.compiled == []
+
+
+def test_the_same_function_again_in_one_process_is_not_compiled_again(workshop):
+    workshop.write(user=BY_ADDRESS)
+    module = workshop.run("user")
+    x, out = np.array([1.0, 2.0]), np.zeros(2)
+    for _ in range(2):
+        assert compiled(module.double.py_func)(x, out) == 0
+        assert out.tolist() == [2.0, 4.0]
+    assert workshop.compiled == ["double"]
 
 
 MAKER = """
