@@ -21,6 +21,8 @@ from surgsim.runs.workers import worker_context
 TRIES = 2
 _MOST_STILLBORN = 5
 _PATIENCE_S = 10.0
+_TRIES_TO_BEGIN = 4
+_PAUSE_S = 0.25
 
 
 @dataclass
@@ -79,17 +81,14 @@ class _Pool:
 
     def hire(self) -> None:
         """Start a process, and give it the next job."""
-        context = worker_context()
-        here, there = context.Pipe()
-        process: Any = context.Process(target=_serve, args=(there, dict(os.environ)), daemon=True)
-        # Ctrl-C reaches every process of a terminal: not one that cannot take it yet.
-        try:
-            with held_back(), _script_hidden():
-                process.start()
-        except (OSError, EOFError) as error:
-            raise SurgsimError(f"a worker process cannot begin: {error}") from error
-        there.close()
-        worker = _Worker(process, here)
+        for tries_left in reversed(range(_TRIES_TO_BEGIN)):
+            try:
+                worker = _begun()
+                break
+            except (OSError, EOFError) as error:
+                if not tries_left:
+                    raise SurgsimError(f"a worker process cannot begin: {error}") from error
+                time.sleep(_PAUSE_S)  # what begins them was killed: it is started again once that is known
         self.workers.append(worker)
         self.assign(worker)
 
@@ -174,6 +173,18 @@ class _Pool:
                 folder = Path(self.jobs[worker.index].folder)
                 with suppress(OSError):
                     clear_drafts(folder.parent, folder.name)
+
+
+def _begun() -> _Worker:
+    """A new worker."""
+    context = worker_context()
+    here, there = context.Pipe()
+    process: Any = context.Process(target=_serve, args=(there, dict(os.environ)), daemon=True)
+    # Ctrl-C reaches every process of a terminal: not one that cannot take it yet.
+    with held_back(), _script_hidden():
+        process.start()
+    there.close()
+    return _Worker(process, here)
 
 
 @contextmanager

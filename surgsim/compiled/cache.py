@@ -44,7 +44,8 @@ class KernelCache(_Cache):
         self._dispatcher, self._compiled = dispatcher, compiled
         function = dispatcher.py_func
         self._kernel = f"{function.__module__}.{function.__qualname__}".replace("<locals>.", "")
-        if compiled is not function:
+        self._is_entrance = compiled is not function  # part of its kernel for who is told of it
+        if self._is_entrance:
             self._kernel += ENTRANCE
         self._entry_of: dict[Any, str | None] = {}
         self._locks: dict[Any, CompileLock] = {}
@@ -75,7 +76,8 @@ class KernelCache(_Cache):
             found = self._wait(sig, entry, target_context)
         if found is None:
             self._expect(sig, entry)
-            watch.began(self._kernel)
+            if not self._is_entrance:
+                watch.began(self._kernel)
         else:
             watch.loaded()
         return found
@@ -92,7 +94,8 @@ class KernelCache(_Cache):
             lock = self._locks.pop(sig, None)
             if lock is not None:
                 lock.release()
-            watch.ended(self._kernel)
+            if not self._is_entrance:
+                watch.ended(self._kernel)
 
     def _entry(self, sig: Any, machine: Any) -> str | None:
         """Name of the file for `sig`; None if there can be none."""

@@ -132,13 +132,7 @@ def test_who_waits_for_another_process_is_told(workshop):
     with listening(release):
         assert workshop.run("user").twice(1.0) == 2.0
     os.close(held)
-    assert told == [
-        ("user.twice.from_python", False, False),
-        ("user.twice", True, False),
-        ("user.twice", False, False),
-        ("user.twice", False, True),
-        ("user.twice.from_python", False, True),
-    ]
+    assert told == [("user.twice", True, False), ("user.twice", False, False), ("user.twice", False, True)]
 
 
 SCRIPT = """
@@ -169,4 +163,4 @@ def test_processes_compile_a_kernel_once_between_them(workshop, tmp_path):
         one.stdin.flush()
         said = [process.communicate("\n", timeout=120)[0] for process in (other, one)]
     assert (one.returncode, other.returncode) == (0, 0)
-    assert sorted(said) == ["", "user.twice\nuser.twice.from_python\n"]
+    assert sorted(said) == ["", "user.twice\n"]

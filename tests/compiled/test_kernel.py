@@ -121,7 +121,8 @@ def thrice(x):
 """
 
 
-def test_a_large_kernel_is_called_by_name_and_loaded_with_its_callers(workshop):
+def test_a_large_kernel_is_called_by_name_and_loaded_with_its_callers(workshop, monkeypatch):
+    monkeypatch.setattr(library, "LARGEST_INLINED_BYTES", 3_500)
     workshop.write(user=LARGE)
     module = workshop.run("user")
     expected = 2.0 * module.large.py_func(30.5), 3.0 * module.large.py_func(30.5)
@@ -136,7 +137,8 @@ def test_a_large_kernel_is_called_by_name_and_loaded_with_its_callers(workshop):
     assert workshop.compiled == []
 
 
-def test_a_caller_is_compiled_again_where_what_it_calls_by_name_is_gone(workshop):
+def test_a_caller_is_compiled_again_where_what_it_calls_by_name_is_gone(workshop, monkeypatch):
+    monkeypatch.setattr(library, "LARGEST_INLINED_BYTES", 3_500)
     workshop.write(user=LARGE)
     expected = workshop.run("user").twice(30.5)
     (entry,) = [path for path in workshop.entries() if "large" in path.name]
