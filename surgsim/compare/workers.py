@@ -1,6 +1,6 @@
 """Worker processes that survive each other's death."""
 
-import os
+import multiprocessing
 import sys
 import time
 from collections import deque
@@ -16,13 +16,11 @@ from surgsim.compiling import Compiling, listening, tell
 from surgsim.errors import SurgsimError
 from surgsim.runs.drafts import clear_drafts
 from surgsim.runs.stop import held_back, leave_in_peace, obey_parent
-from surgsim.runs.workers import worker_context
 
 TRIES = 2
 _MOST_STILLBORN = 5
 _PATIENCE_S = 10.0
-_TRIES_TO_BEGIN = 4
-_PAUSE_S = 0.25
+_SPAWN = multiprocessing.get_context("spawn")
 
 
 @dataclass
@@ -81,14 +79,13 @@ class _Pool:
 
     def hire(self) -> None:
         """Start a process, and give it the next job."""
-        for tries_left in reversed(range(_TRIES_TO_BEGIN)):
-            try:
-                worker = _begun()
-                break
-            except (OSError, EOFError) as error:
-                if not tries_left:
-                    raise SurgsimError(f"a worker process cannot begin: {error}") from error
-                time.sleep(_PAUSE_S)  # what begins them was killed: it is started again once that is known
+        here, there = _SPAWN.Pipe()
+        process = _SPAWN.Process(target=_serve, args=(there,), daemon=True)
+        # Ctrl-C reaches every process of a terminal: not one that cannot take it yet.
+        with held_back(), _script_hidden():
+            process.start()
+        there.close()
+        worker = _Worker(process, here)
         self.workers.append(worker)
         self.assign(worker)
 
@@ -175,18 +172,6 @@ class _Pool:
                     clear_drafts(folder.parent, folder.name)
 
 
-def _begun() -> _Worker:
-    """A new worker."""
-    context = worker_context()
-    here, there = context.Pipe()
-    process: Any = context.Process(target=_serve, args=(there, dict(os.environ)), daemon=True)
-    # Ctrl-C reaches every process of a terminal: not one that cannot take it yet.
-    with held_back(), _script_hidden():
-        process.start()
-    there.close()
-    return _Worker(process, here)
-
-
 @contextmanager
 def _script_hidden() -> Iterator[None]:
     """Keep a new process from running the caller's script again: workers need nothing of it.
@@ -219,9 +204,9 @@ def record_failure(job: Job, name: str, detail: str) -> None:
         raise stopped(str(error)) from error
 
 
-def _serve(pipe: Connection, environment: dict[str, str]) -> None:
+def _serve(pipe: Connection) -> None:
     """A worker's life: jobs in, outcomes out, until the pipe closes or the parent is gone."""
-    obey_parent(environment)
+    obey_parent()
     with suppress(OSError):
         pipe.send(("ready", ""))
 

@@ -32,7 +32,7 @@ SUFFIX = ".nbi"
 ENTRANCE = ".from_python"
 """What follows the name of a kernel in that of its entrance."""
 MOST_ENTRIES = 1500
-_MAGIC = b"surgsim kernel 1\n"
+_MAGIC = b"surgsim kernel 2\n"
 _DAY_S, _HOUR_S = 86_400.0, 3_600.0
 
 
@@ -78,7 +78,7 @@ class KernelCache(_Cache):
             self._expect(sig, entry)
             if not self._is_entrance:
                 watch.began(self._kernel)
-        else:
+        elif not self._is_entrance:
             watch.loaded()
         return found
 

@@ -28,6 +28,7 @@ from numba.extending import is_jitted
 _KNOWN_TO_NUMBA = frozenset({"builtins", "cmath", "ctypes", "math", "numba", "numpy", "operator"})
 _PLAIN = (type(None), type(...), bool, int, float, complex, str, bytes)
 _SETTINGS = ("OPT", "BOUNDSCHECK", "LOOP_VECTORIZE", "SLP_VECTORIZE", "ENABLE_AVX")
+_DECIDING = ("cache", "dispatcher", "kernel", "library")
 _MOST_VALUES = 20_000
 
 
@@ -49,10 +50,11 @@ def identity(dispatcher: Any, signature: Any, machine: Any) -> str:
 
 
 def _surroundings() -> tuple[Any, ...]:
-    """Versions and settings of the compilers."""
+    """Versions and settings of the compilers, and what of this folder decides on the code."""
+    here = (file_hash(str(Path(__file__).with_name(f"{name}.py"))) for name in _DECIDING)
     versions = (numba.__version__, llvmlite.__version__, np.__version__, platform.python_version())
     settings = (getattr(numba.config, name) for name in _SETTINGS)
-    return (*versions, getattr(sys, "abiflags", ""), *map(str, settings))
+    return (*versions, getattr(sys, "abiflags", ""), *map(str, settings), *here)
 
 
 class _Walk:

@@ -99,6 +99,11 @@ class Bound:
         """The parts that Python is entered for, by the value of `Control.who`."""
         return tuple(who for who, part in self.joined.items() if part.entered)
 
+    @property
+    def addressed(self) -> tuple[int, ...]:
+        """The parts whose numbers hold addresses, by the value of `Control.who`."""
+        return tuple(who for who, part in self.joined.items() if part.entered or part.below)
+
     def failure(self, status: int) -> ControlFailure:
         """Why the last tick has no answer.
 

@@ -169,8 +169,8 @@ class Controller:
     @property
     def arrays(self) -> dict[str, Array]:
         """The parts' numbers and memories, without addresses."""
-        entered = {("port_gains", "resolver_gains", "law_gains")[who] for who in self._bound.entered}
-        return {name: a for name, a in self._bound.arrays._asdict().items() if name not in entered}
+        held = {("port_gains", "resolver_gains", "law_gains")[who] for who in self._bound.addressed}
+        return {name: a for name, a in self._bound.arrays._asdict().items() if name not in held}
 
     @property
     def is_compiled(self) -> bool:

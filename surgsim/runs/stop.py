@@ -6,7 +6,7 @@ import signal
 import sys
 import threading
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager
 from types import FrameType
 
@@ -64,14 +64,11 @@ def stopping_in_order() -> Iterator[None]:
             signal.signal(number, before[number])
 
 
-def obey_parent(environment: Mapping[str, str]) -> None:
+def obey_parent() -> None:
     """In a worker process: Ctrl-C is the parent's to handle; its SIGTERM ends the run under way in order.
 
-    The worker has the parent's environment, and ends at once when its parent does, so that a resumed batch
-    never meets an old one.
+    The worker ends at once when its parent does, so that a resumed batch never meets an old one.
     """
-    os.environ.clear()
-    os.environ.update(environment)
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, _leave)
     threading.Thread(target=_die_with_parent, daemon=True).start()

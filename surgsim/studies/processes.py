@@ -1,7 +1,6 @@
 """Do the same thing with many values in several processes, each told of and ended in order."""
 
 import multiprocessing
-import os
 import threading
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
@@ -9,7 +8,6 @@ from typing import Any, TypeVar
 
 from surgsim.compiling import listening, tell
 from surgsim.runs.stop import obey_parent
-from surgsim.runs.workers import worker_context
 
 A = TypeVar("A")
 B = TypeVar("B")
@@ -28,13 +26,11 @@ def in_processes(function: Callable[[A], B], values: Sequence[A], count: int) ->
     if count < 2:
         yield from map(function, values)
         return
-    context, others = worker_context(), set(multiprocessing.active_children())
-    told = context.Queue()
+    spawn, others = multiprocessing.get_context("spawn"), set(multiprocessing.active_children())
+    told = spawn.Queue()
     listener = threading.Thread(target=_tell_all, args=(told,), daemon=True)
     listener.start()
-    pool = ProcessPoolExecutor(
-        count, mp_context=context, initializer=_begin, initargs=(told, dict(os.environ))
-    )
+    pool = ProcessPoolExecutor(count, mp_context=spawn, initializer=_begin, initargs=(told,))
     try:
         yield from pool.map(_Called(function), values)
     except BaseException:
@@ -63,8 +59,8 @@ def _tell_all(told: Any) -> None:
         tell(compiling)
 
 
-def _begin(told: Any, environment: dict[str, str]) -> None:
+def _begin(told: Any) -> None:
     """The beginning of a worker: signals are its parent's to handle, and it does not outlive it."""
     global _told
     _told = told
-    obey_parent(environment)
+    obey_parent()

@@ -4,7 +4,6 @@ import json
 import multiprocessing
 import os
 import signal
-from multiprocessing import forkserver
 from pathlib import Path
 
 import pytest
@@ -14,7 +13,6 @@ from surgsim.compare.job import CRASHED, WORKER_DIED, Job, do
 from surgsim.compare.workers import run_jobs
 from surgsim.errors import SurgsimError
 from surgsim.metrics.timing import TIMING_METRICS
-from surgsim.runs.workers import worker_context
 
 KILL = f"__import__('os').kill(__import__('os').getpid(), {int(signal.SIGKILL)})"
 
@@ -109,7 +107,7 @@ def test_a_dead_worker_is_replaced_and_its_run_tried_once_more(jobs, tmp_path):
 
 
 def test_processes_that_cannot_start_end_the_batch_and_fail_no_run(jobs, tmp_path, monkeypatch):
-    monkeypatch.setattr(workers, "worker_context", lambda: multiprocessing.get_context("spawn"))
+    monkeypatch.setattr(workers, "_SPAWN", multiprocessing.get_context("spawn"))
     before = multiprocessing.spawn.get_executable()
     multiprocessing.set_executable("/bin/false")
     try:
@@ -119,39 +117,6 @@ def test_processes_that_cannot_start_end_the_batch_and_fail_no_run(jobs, tmp_pat
         multiprocessing.set_executable(before)
     assert str(error.value) == "worker processes end before they can begin (exit code 1)"
     assert not (tmp_path / "runs").exists()
-
-
-def test_a_server_of_workers_that_cannot_start_ends_the_batch_and_fails_no_run(jobs, tmp_path):
-    before = multiprocessing.spawn.get_executable()
-    forkserver._forkserver._stop()
-    multiprocessing.set_executable("/bin/false")
-    try:
-        with pytest.raises(SurgsimError, match=r"^a worker process cannot begin: "):
-            list(run_jobs(jobs(2), 2))
-    finally:
-        multiprocessing.set_executable(before)
-        forkserver._forkserver._stop()
-    assert not (tmp_path / "runs").exists()
-
-
-def test_a_batch_goes_on_when_the_server_of_its_workers_is_killed(jobs):
-    given = jobs(4)
-    running = run_jobs(given, 1)
-    done = [next(running)]
-    os.kill(forkserver._forkserver._forkserver_pid, signal.SIGKILL)
-    done += running
-    assert {each.index: each.outcome for each in done} == dict.fromkeys(range(4), "completed")
-    assert all(metrics(job)[1]["name"] == "completed" for job in given)
-
-
-def test_workers_find_what_is_put_on_the_path_later(jobs, tmp_path, monkeypatch):
-    assert [each.outcome for each in run_jobs(jobs(1), 1)] == ["completed"]
-    assert worker_context().get_start_method() == "forkserver"
-    monkeypatch.syspath_prepend(tmp_path)
-    assert worker_context().get_start_method() == "spawn"
-    monkeypatch.undo()
-    monkeypatch.setenv("NUMBA_OPT", "1")
-    assert worker_context().get_start_method() == "spawn"
 
 
 def test_a_disk_that_refuses_ends_the_batch_and_a_later_call_goes_on(jobs):

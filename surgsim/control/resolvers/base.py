@@ -138,7 +138,7 @@ class KernelResolver:
     def failure(self, status: int, seen: Seen, memory: Array) -> ControlFailure:
         """Why there is no answer: its own, or that of the resolver below."""
         below: Any = self.below
-        if below is not None and hasattr(below, "failure"):
+        if status not in self.failures and below is not None and hasattr(below, "failure"):
             failure: ControlFailure = below.failure(status, seen, memory[memory.size - below.memory_size :])
             return failure
         data = {"q": seen.q.copy()} if self.examine is None else self.examine(self.gains, seen, memory)

@@ -1,16 +1,21 @@
-"""The resolver below a policy, and whose failure it is that ends a run."""
+"""The resolver below a policy or another kernel, and whose failure it is that ends a run."""
 
+import gc
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from surgsim.compiled import compiled
 from surgsim.control.failure import ControlFailure
+from surgsim.control.inside import HEAD_SIZE, resolve_below
+from surgsim.control.resolvers.base import KernelResolver
 from surgsim.control.resolvers.pinv import PinvConfig
 from surgsim.control.resolvers.policy import PolicyConfig
 from surgsim.errors import Outcome
 from surgsim.simulate.loop import Simulation, simulate
 from surgsim.simulate.setup import prepare
+from surgsim.tick.status import RANK_LOST
 
 
 class PlainPinv:
@@ -128,3 +133,47 @@ def test_the_reason_of_a_run_s_end_is_not_that_of_a_tick_before(scenario, regist
     controller = setup.controller.with_parts(replace(parts, resolver=_over(below, parts.resolver)))
     with pytest.raises(KeyError, match="mine"):
         Simulation(replace(setup, controller=controller)).run()
+
+
+@compiled
+def hand_on(gains, seen, memory, out):
+    return resolve_below(gains, seen, memory, out)
+
+
+@compiled
+def give_up(gains, seen, memory, out):
+    return RANK_LOST
+
+
+def _kernel_over_pinv(kernel, arm, **more):
+    below, head = PinvConfig().build(arm), np.zeros(HEAD_SIZE)
+    size = below.memory_size
+    return KernelResolver(kernel=kernel, arm=arm, gains=head, memory_size=size, below=below, **more)
+
+
+def test_a_snapshot_holds_no_address_of_the_resolver_below(scenario):
+    made = scenario("task.duration_s=0.2", controller="pinv")
+
+    def simulation():
+        setup = prepare(made)
+        parts = replace(setup.controller.parts, resolver=_kernel_over_pinv(hand_on, setup.arm))
+        return Simulation(replace(setup, controller=setup.controller.with_parts(parts)))
+
+    first = simulation()
+    first.advance(100)
+    taken = first.snapshot()
+    assert "resolver_gains" not in taken.arrays
+    del first
+    gc.collect()
+    other = simulation()
+    other.restore(taken)
+    assert other.run().equals(simulate(made))
+
+
+def test_a_kernel_says_itself_why_it_gave_up(arm, velocity_problem):
+    told = _kernel_over_pinv(give_up, arm, failures={RANK_LOST: "of its own accord"})
+    with pytest.raises(ControlFailure, match="of its own accord"):
+        told.step(velocity_problem(0), None)
+    silent = _kernel_over_pinv(give_up, arm)
+    with pytest.raises(ControlFailure, match=r"rank|Jacobian"):
+        silent.step(velocity_problem(0), None)
