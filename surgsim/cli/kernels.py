@@ -56,7 +56,7 @@ class _Shown:
         now = time.perf_counter()
         if self._next_s is None:
             self._next_s = now + _PATIENCE_S
-            self._kept = _place_to_keep() is not None
+            self._kept = _is_kept()
         if not told.awaited:
             self._count(told, now)
         elif self._under_way:  # of a worker that another one keeps waiting
@@ -112,20 +112,21 @@ def _overwrite(text: str) -> None:
     print(f"\r\x1b[K{text}", end="", file=sys.stderr, flush=True)
 
 
-def _place_to_keep() -> Path | None:
-    """The folder that kernels are kept in; None if there is none."""
-    from surgsim.compiled.places import places, prepared
+def _is_kept() -> bool:
+    """Whether there is a folder for kernels."""
+    from surgsim.compiled.cache import place_to_write
 
-    return next((place for place in places() if prepared(place)), None)
+    return place_to_write() is not None
 
 
 def _where(began_at: float) -> str:
     """Where what was compiled since `began_at`, seconds of the epoch, is kept; empty if nowhere."""
+    from surgsim.compiled.cache import SUFFIX
     from surgsim.compiled.places import places
 
     for place in places():
         with suppress(OSError):
-            if any(entry.stat().st_mtime >= began_at for entry in place.glob("*.nbi")):
+            if any(entry.stat().st_mtime >= began_at for entry in place.glob(f"*{SUFFIX}")):
                 temporary = Path(tempfile.gettempdir()) in place.parents
                 return "; kept among the temporary files" if temporary else "; kept for the next start"
     return ""

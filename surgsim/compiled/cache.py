@@ -118,7 +118,7 @@ class KernelCache(_Cache):
 
     def _wait(self, sig: Any, entry: str, target_context: Any) -> Any:
         """The kernel, if another process is compiling it; else this one is to, and the others wait."""
-        place = _place_to_write()
+        place = place_to_write()
         if place is None:
             return None
         lock = CompileLock(place / entry)
@@ -216,7 +216,8 @@ def _written(place: Path, entry: str, content: bytes) -> bool:
     return True
 
 
-def _place_to_write() -> Path | None:
+def place_to_write() -> Path | None:
+    """The folder that kernels are kept in; None if there is none."""
     return next((place for place in places() if prepared(place)), None)
 
 
