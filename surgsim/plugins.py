@@ -17,6 +17,7 @@ GROUPS = (
     "surgsim.props",
     "surgsim.plants",
     "surgsim.policies",
+    "surgsim.robots",
 )
 """The entry-point groups that surgsim reads."""
 _OURS = "surgsim."

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 import surgsim
-from surgsim.models.robot import robot_names
+from surgsim.models.folders import robot_names
 
 PACKAGE = Path(surgsim.__file__).parent
 FILES = sorted(

@@ -20,7 +20,15 @@ from surgsim.control.port_estimators import PORT_ESTIMATORS
 from surgsim.control.resolvers import RESOLVERS
 from surgsim.control.torque_laws import TORQUE_LAWS
 from surgsim.metrics.catalog import METRICS, compute_metrics
-from surgsim.models.config import InstrumentConfig, RobotConfig, TrocarConfig, WallConfig
+from surgsim.models.config import (
+    CapsuleConfig,
+    FlangeConfig,
+    InstrumentConfig,
+    LimitsConfig,
+    RobotConfig,
+    TrocarConfig,
+    WallConfig,
+)
 from surgsim.plant import PLANTS
 from surgsim.plant.disturbances import DISTURBANCES
 from surgsim.plant.props import PROPS
@@ -127,6 +135,9 @@ def sections():
     found = {
         "scenario": Scenario,
         "robot": RobotConfig,
+        "robot: flange": FlangeConfig,
+        "robot: limits": LimitsConfig,
+        "robot: capsule": CapsuleConfig,
         "instrument": InstrumentConfig,
         "trocar": TrocarConfig,
         "trocar.wall": WallConfig,

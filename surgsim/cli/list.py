@@ -49,7 +49,8 @@ def items_of(kind: str) -> list[tuple[str, str]]:
     if kind in ("scenarios", "suites", "controllers"):
         return _files(kind)
     if kind == "robots":
-        from surgsim.models.robot import robot_description, robot_names
+        from surgsim.models.folders import robot_names
+        from surgsim.models.robot import robot_description
 
         return [(name, robot_description(name)) for name in robot_names()]
     if kind == "policies":

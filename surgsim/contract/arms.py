@@ -9,7 +9,7 @@ from surgsim.control.redundancy import redundancy_needed
 from surgsim.errors import told
 from surgsim.models.arm import ArmModel
 from surgsim.models.config import RobotConfig, SceneConfig, TrocarConfig
-from surgsim.models.robot import arms_for_tests
+from surgsim.models.folders import arms_for_tests
 
 _PORT = TrocarConfig(position_m=(0.0, 0.55, 0.2))
 

@@ -13,7 +13,7 @@ from surgsim.models.collision import CollisionShapes, collision_shapes
 from surgsim.models.config import RobotConfig, SceneConfig, WallConfig
 from surgsim.models.graft import graft
 from surgsim.models.instrument import attach_instrument
-from surgsim.models.robot import JointLimits, joint_names, motor_names, robot_spec
+from surgsim.models.robot import JointLimits, home_of, joint_names, motor_names, robot_spec
 from surgsim.models.theatre import (
     CANNULA_JOINTS,
     GRAVITY_M_PER_S2,
@@ -55,6 +55,7 @@ class Scene:
             without a wall.
         cannula_dof_ids: Where its velocity is in `qvel` (3,); (0,) without a wall.
         limits: What the joints can do.
+        home: The arm's own home posture (n,) [rad]; None where it has none.
         shapes: Where forbidden contacts are looked for.
     """
 
@@ -72,6 +73,7 @@ class Scene:
     cannula_qpos_ids: Ids
     cannula_dof_ids: Ids
     limits: JointLimits
+    home: NDArray[np.float64] | None
     shapes: CollisionShapes
 
 
@@ -120,7 +122,7 @@ def _add_arm(spec: mujoco.MjSpec, config: SceneConfig) -> None:
     spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET  # divergence must be seen
     spec.option.gravity = [0.0, 0.0, -GRAVITY_M_PER_S2]
     drawn = not spec.compiler.discardvisual
-    arm = robot_spec(config.robot.name, config.robot.dh_variant, drawn=drawn)
+    arm = robot_spec(config.robot, drawn=drawn)
     attach_instrument(arm, config.instrument)
     graft(spec, arm, frame=_base_frame(spec, config.robot))
 
@@ -150,6 +152,7 @@ def _compile(spec: mujoco.MjSpec, config: SceneConfig) -> Scene:
         cannula_qpos_ids=_ids([slide.qposadr[0] for slide in slides]),
         cannula_dof_ids=_ids([slide.dofadr[0] for slide in slides]),
         limits=JointLimits.of(model),
+        home=home_of(model),
         shapes=collision_shapes(model, config),
     )
 

@@ -20,6 +20,8 @@ from surgsim.models.theatre import patient_place
 Array = NDArray[np.float64]
 Ids = NDArray[np.intp]
 _ADAPTER_RADIUS_M = 0.026
+NEVER_TOUCH = "never_touch"
+_NUMBERS = 7  # of a capsule
 _NEXT_THAT_CAN_TOUCH = 3  # along the chain: nearer ones are held apart by the joints' ranges
 _TABLE_CENTRE_M, _TABLE_HALF_M = (0.0, -0.13, -0.223), (0.268, 0.98, 0.054)  # pads and top of the drawn table
 
@@ -52,41 +54,59 @@ class CollisionShapes:
 def collision_shapes(model: mujoco.MjModel, config: SceneConfig) -> CollisionShapes:
     """Shapes of the scene that `model` was compiled from."""
     joints = len(joint_names(model))
-    capsules = {name: (name, *_capsule(model, name)) for name in ("base", *link_names(joints))}
+    bodies = ("base", *link_names(joints))
+    capsules = [(name, name, *capsule) for name in bodies for capsule in _capsules(model, name)]
     if config.instrument is not None:
         entry, tip = config.instrument.adapter_length_m, config.instrument.shaft_length_m
         tip += entry
         below = (0.0, 0.0, max(0.0, entry - _ADAPTER_RADIUS_M))
-        capsules["adapter"] = ("instrument", np.zeros(3), np.array(below), _ADAPTER_RADIUS_M)
+        capsules.append(("adapter", "instrument", np.zeros(3), np.array(below), _ADAPTER_RADIUS_M))
         radius = 0.5 * config.instrument.shaft_diameter_m
         ends = np.array([0.0, 0.0, entry]), np.array([0.0, 0.0, tip - radius])
-        capsules["shaft"] = ("instrument", *ends, radius)
-    names = tuple(capsules)
+        capsules.append(("shaft", "instrument", *ends, radius))
+    names = tuple(name for name, *_ in capsules)
     return CollisionShapes(
         names=names,
-        bodies=np.array([model.body(body).id for body, *_ in capsules.values()], dtype=np.intp),
-        ends=np.array([[one, other] for _, one, other, _ in capsules.values()]),
-        radii=np.array([radius for *_, radius in capsules.values()]),
-        pairs=_pairs(names, joints),
+        bodies=np.array([model.body(body).id for _, body, *_ in capsules], dtype=np.intp),
+        ends=np.array([[one, other] for *_, one, other, _ in capsules]),
+        radii=np.array([radius for *_, radius in capsules]),
+        pairs=_pairs(names, (*bodies, "adapter", "shaft"), _left_out(model)),
         shaft=names.index("shaft") if "shaft" in names else -1,
         patient=_patient(config),
     )
 
 
-def _capsule(model: mujoco.MjModel, body: str) -> tuple[Array, Array, float]:
-    """End points (3,) [m] in the body's frame and radius [m] of the capsule of an arm's body."""
-    numbers = model.numeric(f"capsule_{body}").data
-    return numbers[:3], numbers[3:6], float(numbers[6])
+def _capsules(model: mujoco.MjModel, body: str) -> list[tuple[Array, Array, float]]:
+    """End points (3,) [m] in the body's frame and radius [m] of the capsules of an arm's body."""
+    if mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_NUMERIC, f"capsule_{body}") < 0:
+        return []
+    rows = np.array(model.numeric(f"capsule_{body}").data).reshape(-1, _NUMBERS)
+    return [(row[:3], row[3:6], float(row[6])) for row in rows]
 
 
-def _pairs(names: tuple[str, ...], joints: int) -> Ids:
-    """Capsules that are far enough apart along the chain.
+def _left_out(model: mujoco.MjModel) -> set[tuple[str, str]]:
+    """Pairs that the arm's text `never_touch` names."""
+    if mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_TEXT, NEVER_TOUCH) < 0:
+        return set()
+    text = model.text(NEVER_TOUCH).data
+    words = (text if isinstance(text, str) else bytes(text).decode()).strip("\0 ").split()
+    return {(one, other) for one, _, other in (word.partition("-") for word in words)}
+
+
+def _pairs(names: tuple[str, ...], along: tuple[str, ...], left_out: set[tuple[str, str]]) -> Ids:
+    """Capsules that are far enough apart along the chain, `along` which the parts stand.
 
     The bent wrist holds the adapter beside the link above it, the third from the end.
     """
-    count, near = len(names), {(f"link{joints - 2}", "adapter")}
-    pairs = [(i, j) for i in range(count) for j in range(i + _NEXT_THAT_CAN_TOUCH, count)]
-    return np.array([pair for pair in pairs if (names[pair[0]], names[pair[1]]) not in near], dtype=np.intp)
+    place = {name: i for i, name in enumerate(along)}
+    near = {(along[-5], "adapter")} | left_out
+    pairs = [
+        (i, j)
+        for i, one in enumerate(names)
+        for j, other in enumerate(names)
+        if place[other] - place[one] >= _NEXT_THAT_CAN_TOUCH and (one, other) not in near
+    ]
+    return np.array(pairs, dtype=np.intp).reshape(-1, 2)
 
 
 def _patient(config: SceneConfig) -> Array:

@@ -1,13 +1,30 @@
 """What a scene is made of."""
 
 import math
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Annotated, Literal, Self
+from pathlib import Path
+from typing import Annotated, Any, Literal, Self
 
-from pydantic import AfterValidator, Field, FiniteFloat, NonNegativeFloat, PositiveFloat, model_validator
+from pydantic import (
+    AfterValidator,
+    Field,
+    FiniteFloat,
+    NonNegativeFloat,
+    PositiveFloat,
+    SerializerFunctionWrapHandler,
+    model_serializer,
+    model_validator,
+)
+from pydantic_core import PydanticCustomError
 
 from surgsim.catalog import PartConfig
-from surgsim.models.robot import known_robot, with_literal_variant
+from surgsim.models.adopted.arm import adopted
+from surgsim.models.adopted.file import Kind, files_sha256
+from surgsim.models.adopted.problem import AdoptionError
+from surgsim.models.folders import known_robot, with_literal_variant
 
 Vec3 = tuple[FiniteFloat, FiniteFloat, FiniteFloat]
 
@@ -20,26 +37,185 @@ class ForEachJoint:
 PerJoint = Annotated[tuple[FiniteFloat, ...], ForEachJoint()]
 """A number for each joint, from the base on (n,)."""
 RobotName = Annotated[str, AfterValidator(known_robot)]
+Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
+
+
+class FlangeConfig(PartConfig):
+    """Where the tool is fixed in an arm's file; z is the tool axis.
+
+    Attributes:
+        site: A site of the file.
+        body: Or a body of the file.
+        position_m: Of the flange in the body's frame [m].
+        quaternion_wxyz: Of the flange in the body's frame.
+    """
+
+    site: str | None = None
+    body: str | None = None
+    position_m: Vec3 = (0.0, 0.0, 0.0)
+    quaternion_wxyz: tuple[FiniteFloat, FiniteFloat, FiniteFloat, FiniteFloat] = (1.0, 0.0, 0.0, 0.0)
+
+    @model_validator(mode="after")
+    def _is_one_place(self) -> Self:
+        if (self.site is None) == (self.body is None):
+            raise ValueError("give a site or a body")
+        moved = self.position_m != (0.0, 0.0, 0.0) or self.quaternion_wxyz != (1.0, 0.0, 0.0, 0.0)
+        if self.site is not None and moved:
+            raise ValueError("position_m and quaternion_wxyz are in a body's frame: give a body")
+        if not any(self.quaternion_wxyz):
+            raise ValueError("quaternion_wxyz must not be zero")
+        return self
+
+
+class LimitsConfig(PartConfig):
+    """What the joints of an arm from a file can do, each list with a number for each joint; null: the file's.
+
+    Attributes:
+        velocity_rad_per_s: Largest speeds [rad/s].
+        acceleration_rad_per_s2: Largest accelerations [rad/s^2].
+        torque_nm: Largest torques [N m].
+    """
+
+    velocity_rad_per_s: tuple[Positive, ...] | None = None
+    acceleration_rad_per_s2: tuple[Positive, ...] | None = None
+    torque_nm: tuple[Positive, ...] | None = None
+
+
+class CapsuleConfig(PartConfig):
+    """Where collisions of an arm from a file are looked for.
+
+    Attributes:
+        body: A body of the file.
+        from_m: One end of the axis in the body's frame [m].
+        to_m: The other end [m].
+        radius_m: [m].
+    """
+
+    body: str
+    from_m: Vec3
+    to_m: Vec3
+    radius_m: PositiveFloat
 
 
 class RobotConfig(PartConfig):
-    """Which arm, and where its base stands in the world.
+    """Which arm, and where its base stands in the world: a name, or somebody's own file.
 
     Attributes:
+        name: A robot's folder: one that is shipped, on the search path, or of an installed package.
+        mjcf: Or an MJCF file.
+        urdf: Or a URDF file.
+        base_body: Body of the file that the base is; null: the root of the arm.
+        joints: Joints of the file, from the base on; null: all from the base to the flange.
+        flange: Where the tool is fixed; null: the file's site or body `flange`, `attachment_site` or `tool0`.
+        home_rad: A posture to prefer [rad]; null: the file's keyframe `home`.
+        limits: Limits that the file lacks, or that count before its own.
+        collision: `auto` fits capsules to the file's shapes; or a list of capsules.
+        files_sha256: Hash of the file and all that it names; filled in, and checked where it is given.
+        base_position_m: Of the base in the world [m].
+        base_yaw_rad: Turn of the base about the vertical [rad].
         dh_variant: `literal` takes d2 as Table 3 of the manipulability paper prints it, a misprint: for
             studies of that paper and its arm alone.
     """
 
-    name: RobotName
+    name: RobotName | None = None
+    mjcf: str | None = None
+    urdf: str | None = None
+    base_body: str | None = None
+    joints: tuple[str, ...] | None = None
+    flange: FlangeConfig | None = None
+    home_rad: tuple[FiniteFloat, ...] | None = None
+    limits: LimitsConfig = LimitsConfig()
+    collision: Literal["auto"] | tuple[CapsuleConfig, ...] = "auto"
+    files_sha256: str | None = None
     base_position_m: Vec3 = (0.0, 0.0, 0.0)
     base_yaw_rad: FiniteFloat = 0.0
     dh_variant: Literal["standard", "literal"] = "standard"
 
     @model_validator(mode="after")
-    def _variant_exists(self) -> Self:
+    def _is_one_arm(self) -> Self:
+        if sum(place is not None for place in (self.name, self.mjcf, self.urdf)) != 1:
+            raise ValueError("give one of name, mjcf and urdf")
+        if self.name is not None:
+            strange = [key for key in OF_FILES if getattr(self, key) != type(self).model_fields[key].default]
+            if strange:
+                raise ValueError(f"{strange[0]} is for an arm from a file; '{self.name}' has its own")
         if self.dh_variant == "literal" and self.name not in (known := with_literal_variant()):
-            raise ValueError(f"dh_variant 'literal' is of '{', '.join(known)}' alone, not of '{self.name}'")
+            raise ValueError(f"dh_variant 'literal' is of '{', '.join(known)}' alone, not of '{self.label}'")
+        if self.name is None:
+            with placed_errors():
+                self._read_file()
         return self
+
+    def _read_file(self) -> None:
+        """Fill in the file's whole path and the hash of what it holds, and see that it is an arm."""
+        path, kind = self.file
+        found = files_sha256(path, kind)
+        if self.files_sha256 not in (None, found):
+            raise AdoptionError(
+                f"{path} or a file that it names has changed since files_sha256 was written; leave the key "
+                f"out to take it as it now is",
+                "files_sha256",
+            )
+        for key, value in ((kind, os.path.abspath(path)), ("files_sha256", found)):
+            object.__setattr__(self, key, value)  # frozen, but still being made
+        adopted(self)
+
+    @model_serializer(mode="wrap")
+    def _without_what_has_no_use(self, write: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """Of an arm with a name the keys for files say nothing, and of one from a file the other places."""
+        every: dict[str, Any] = write(self)
+        idle = OF_FILES if self.name is not None else ("name",)
+        return {
+            key: v for key, v in every.items() if key not in idle and (key not in PLACES or v is not None)
+        }
+
+    @property
+    def file(self) -> tuple[Path, Kind]:
+        """The arm's file, and which language it is in.
+
+        Raises:
+            ValueError: If the arm has a name instead.
+        """
+        if self.mjcf is not None:
+            return Path(self.mjcf), "mjcf"
+        if self.urdf is not None:
+            return Path(self.urdf), "urdf"
+        raise ValueError(f"'{self.name}' is no file")
+
+    @property
+    def label(self) -> str:
+        """What messages and tables call it: its name, or that of its file."""
+        return self.name if self.name is not None else self.file[0].stem
+
+    @property
+    def listed_capsules(self) -> tuple[CapsuleConfig, ...]:
+        """The capsules that are given; none with `auto`."""
+        return () if isinstance(self.collision, str) else self.collision
+
+
+KINDS: tuple[Kind, ...] = ("mjcf", "urdf")
+PLACES = ("name", *KINDS)
+OF_FILES = (
+    "mjcf",
+    "urdf",
+    "base_body",
+    "joints",
+    "flange",
+    "home_rad",
+    "limits",
+    "collision",
+    "files_sha256",
+)
+"""Keys that are for an arm from a file alone."""
+
+
+@contextmanager
+def placed_errors() -> Iterator[None]:
+    """Say what is wrong with an arm's file at the key that it is about."""
+    try:
+        yield
+    except AdoptionError as error:
+        raise PydanticCustomError("placed", "{text}", {"text": str(error), "at": error.at}) from error
 
 
 class InstrumentConfig(PartConfig):

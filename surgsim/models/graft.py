@@ -1,6 +1,7 @@
 """Put one MJCF model into another without changing what its parts are called."""
 
 from functools import lru_cache
+from pathlib import Path
 
 import mujoco
 
@@ -8,11 +9,19 @@ from surgsim.resources import resource_dir
 
 
 def asset(path: str, *, drawn: bool = True) -> mujoco.MjSpec:
-    """The MJCF file `path` under `assets/`, to be changed; unless `drawn` without what is only looked at.
+    """The MJCF file `path` under `assets/`, to be changed; unless `drawn` without what is only looked at."""
+    return read_mjcf(resource_dir("assets") / path, drawn=drawn)
+
+
+def read_mjcf(file: Path, *, drawn: bool = True) -> mujoco.MjSpec:
+    """The MJCF `file`, to be changed; unless `drawn` without what is only looked at.
 
     MuJoCo can discard that itself, but computes its meshes first, which takes longer than all the rest.
+
+    Raises:
+        ValueError: If MuJoCo cannot read it.
     """
-    return _read(str(resource_dir("assets") / path), drawn).copy()
+    return _read(str(file), drawn).copy()
 
 
 @lru_cache(maxsize=32)

@@ -1,40 +1,32 @@
-"""The arms: where their models are, what their parts are called, and what their limits are.
+"""An arm's model: what its parts are called, and what its limits are.
 
-A robot is a folder `assets/robots/<name>/` with `<name>.xml`, an MJCF that holds nothing but an arm: a chain
-of n revolute joints.
+Every arm, of a robot's folder or from somebody's own file, has this form: an MJCF that holds nothing but a
+chain of n revolute joints.
 
 - bodies `base`, `link1`..`link<n>`, joints `joint1`..`joint<n>`, torque motors `motor1`..`motor<n>` whose
   ctrlrange is the torque limit, and on the last link a site `flange` whose z is the tool axis;
 - the numerics that MJCF has no attribute for, of n numbers each: `velocity_limit_rad_per_s`,
   `acceleration_limit_rad_per_s2`, and where they are published `jerk_limit_rad_per_s3` and
-  `torque_rate_limit_nm_per_s`;
+  `torque_rate_limit_nm_per_s`; and `home_rad`, a posture to prefer, where there is one;
 - for `base` and each link a numeric `capsule_<body>`, where collisions are looked for: two end points [m] in
-  the body's frame and a radius [m];
+  the body's frame and a radius [m], as often as there are capsules;
+- a text `never_touch`, pairs such as `base-link3 link2-adapter` that are not looked at, where there are any;
 - a text `description`.
-
-`assets/test_arms/` holds arms of other numbers of joints, for tests: no real ones, and not listed.
 """
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import count, takewhile
-from pathlib import Path
 from typing import Self
 
 import mujoco
 import numpy as np
 from numpy.typing import ArrayLike
 
-from surgsim.errors import SurgsimError, unknown_name
-from surgsim.models.graft import asset
-from surgsim.resources import resource_dir
+from surgsim.models.adopted.arm import adopted
+from surgsim.models.config import RobotConfig
+from surgsim.models.folders import LITERAL_D2, named_spec
 from surgsim.spatial import Array
-
-ROBOTS, TEST_ARMS = "robots", "test_arms"
-"""Folders of `assets/`."""
-_LITERAL_D2 = "literal_d2_m"
-"""Numeric of the arm whose DH table a paper misprints: d2 as it stands there."""
 
 
 def joint_names(model: mujoco.MjModel | mujoco.MjSpec) -> tuple[str, ...]:
@@ -93,78 +85,49 @@ class JointLimits:
         )
 
 
-def robot_names() -> list[str]:
-    """Names of the shipped robots, sorted."""
-    return sorted(path.stem for path in _files(ROBOTS))
-
-
-def arms_for_tests() -> list[str]:
-    """Names of the arms that are for tests alone, sorted: by their number of joints."""
-    return sorted(path.stem for path in _files(TEST_ARMS))
-
-
-def _files(folder: str) -> Iterator[Path]:
-    """The MJCF of every arm of a folder of `assets/`."""
-    for path in (resource_dir("assets") / folder).iterdir():
-        if (file := path / f"{path.name}.xml").is_file():
-            yield file
-
-
-def known_robot(name: str) -> str:
-    """`name`, if there is such an arm.
-
-    Raises:
-        ValueError: If there is not.
-    """
-    if name not in (*robot_names(), *arms_for_tests()):
-        raise ValueError(unknown_name(name, "robot", robot_names()))
-    return name
-
-
 def robot_description(name: str) -> str:
-    """One line about a robot, from its model.
+    """One line about a robot of a folder, from its model.
 
     Raises:
         SurgsimError: If there is no such robot.
     """
-    return str(robot_spec(name, drawn=False).text("description").data)
+    spec = named_spec(name, drawn=False)
+    return next((str(text.data) for text in spec.texts if text.name == "description"), "no description")
 
 
-@lru_cache(maxsize=32)
-def robot_joints(name: str) -> int:
+@lru_cache(maxsize=64)
+def robot_joints(robot: RobotConfig) -> int:
     """Number of a robot's joints.
 
     Raises:
         SurgsimError: If there is no such robot.
     """
-    return len(joint_names(robot_spec(name, drawn=False)))
+    return len(joint_names(robot_spec(robot, drawn=False)))
 
 
-def with_literal_variant() -> list[str]:
-    """The robots whose DH table a paper prints otherwise, see `robot_spec`."""
-    specs = {name: robot_spec(name, drawn=False) for name in robot_names()}
-    return [name for name, spec in specs.items() if any(n.name == _LITERAL_D2 for n in spec.numerics)]
+def robot_spec(robot: RobotConfig, *, drawn: bool = True) -> mujoco.MjSpec:
+    """The arm alone, its base at the origin; unless `drawn` without what is only looked at.
 
-
-def robot_spec(name: str, dh_variant: str = "standard", *, drawn: bool = True) -> mujoco.MjSpec:
-    """The arm alone, its base at the origin; `literal` moves link 3 along the axis of joint 2 by its d2.
-
-    That is its numeric `literal_d2_m`, which only an arm whose DH table is misprinted has. Unless `drawn`,
-    without what is only looked at.
+    `dh_variant: literal` moves link 3 along the axis of joint 2 by the arm's numeric `literal_d2_m`, which
+    only an arm whose DH table is misprinted has.
 
     Raises:
         SurgsimError: If there is no such robot.
     """
-    try:
-        folder = ROBOTS if known_robot(name) in robot_names() else TEST_ARMS
-    except ValueError as error:
-        raise SurgsimError(str(error)) from error
-    spec = asset(f"{folder}/{name}/{name}.xml", drawn=drawn)
-    if dh_variant == "literal":
+    if robot.name is None:
+        return adopted(robot).spec(drawn=drawn)
+    spec = named_spec(robot.name, drawn=drawn)
+    if robot.dh_variant == "literal":
         axis = np.array(spec.joint("joint2").axis)
         link = spec.body("link3")
-        link.pos = np.array(link.pos) + float(spec.numeric(_LITERAL_D2).data[0]) * axis
+        link.pos = np.array(link.pos) + float(spec.numeric(LITERAL_D2).data[0]) * axis
     return spec
+
+
+def home_of(model: mujoco.MjModel) -> Array | None:
+    """The arm's own home posture (n,) [rad], where it has one."""
+    known = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_NUMERIC, "home_rad") >= 0
+    return _frozen(model.numeric("home_rad").data) if known else None
 
 
 def _optional(model: mujoco.MjModel, numeric: str, n: int) -> Array:

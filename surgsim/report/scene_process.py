@@ -33,8 +33,8 @@ def main(asked: Mapping[str, Any]) -> list[dict[str, Any]]:
     for name in asked["scenarios"]:
         try:
             scenario = load_scenario(name)
-            if scenario.robot.name not in found:
-                found[scenario.robot.name] = _scene(scenario, draw=bool(asked["draw"]))
+            if scenario.robot.label not in found:
+                found[scenario.robot.label] = _scene(scenario, draw=bool(asked["draw"]))
         except SurgsimError:
             continue  # a scenario that is no longer at hand; another may be
         if len(found) == MOST:
@@ -50,7 +50,7 @@ def _scene(scenario: Scenario, *, draw: bool) -> dict[str, Any]:
     trocar = scenario.trocar
     return {
         "scenario": scenario.name,
-        "robot": scenario.robot.name,
+        "robot": scenario.robot.label,
         "base": list(scenario.robot.base_position_m),
         "joints": _points(kin.anchors_W),
         "tip": kin.p_WT.tolist(),

@@ -10,6 +10,7 @@ from typing import Any
 
 from surgsim.control.controller import ControllerConfig
 from surgsim.errors import ScenarioError, unknown_name
+from surgsim.models.config import KINDS
 from surgsim.resources import resource_dir
 from surgsim.scenario.plain import document_of
 from surgsim.scenario.schema import Scenario
@@ -81,10 +82,20 @@ def load_scenario(
 
 def _document(source: Source | Scenario) -> YamlDocument:
     if isinstance(source, str | os.PathLike):
-        return read_yaml(find(source, "", "scenario"))
+        return _beside_it(read_yaml(find(source, "", "scenario")))
     if isinstance(source, Mapping | Scenario):
         return document_of(source)
     raise ScenarioError("", f"a {type(source).__name__} is no scenario: give a name, a path or a mapping")
+
+
+def _beside_it(document: YamlDocument) -> YamlDocument:
+    """`document` with the path of the arm's file from the scenario's own folder on."""
+    robot = document.tree.get("robot")
+    if not isinstance(robot, dict):
+        return document
+    folder = Path(document.source).parent.absolute()
+    whole = {key: str(folder / robot[key]) for key in KINDS if isinstance(robot.get(key), str)}
+    return replace(document, tree={**document.tree, "robot": {**robot, **whole}})
 
 
 def _instead(document: YamlDocument, controller: Source | ControllerConfig) -> YamlDocument:

@@ -7,13 +7,13 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticCustomError
 
-from surgsim.models.config import ForEachJoint
+from surgsim.models.config import ForEachJoint, RobotConfig
 from surgsim.models.robot import robot_joints
 from surgsim.scenario.wording import show, unwrap
 from surgsim.scenario.yaml_events import KeyPath
 
 
-def check_lists(config: BaseModel, robot: str) -> None:
+def check_lists(config: BaseModel, robot: RobotConfig) -> None:
     """Refuse a list that has not one item for each joint of `robot`.
 
     Raises:
@@ -23,8 +23,9 @@ def check_lists(config: BaseModel, robot: str) -> None:
     for path, values in _lists(config):
         if len(values) != n:
             count = f"{len(values)} item{'' if len(values) == 1 else 's'}"
-            text = f"{show(list(values))} has {count}; robot '{robot}' has {n} joints. Expected {n} numbers."
-            raise PydanticCustomError("per_joint", "{text}", {"text": text, "at": path})
+            has = f"{show(list(values))} has {count}; robot '{robot.label}' has {n} joints"
+            text = f"{has}. Expected {n} numbers."
+            raise PydanticCustomError("placed", "{text}", {"text": text, "at": path})
 
 
 def _lists(config: BaseModel, path: KeyPath = ()) -> Iterator[tuple[KeyPath, Sequence[Any]]]:

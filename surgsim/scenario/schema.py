@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 
 import numpy as np
@@ -9,7 +10,7 @@ from pydantic import Field, NonNegativeInt, PositiveFloat, model_validator
 
 from surgsim.catalog import Name, PartConfig
 from surgsim.control.controller import ControllerConfig
-from surgsim.models.config import InstrumentConfig, PerJoint, RobotConfig, SceneConfig, TrocarConfig
+from surgsim.models.config import KINDS, InstrumentConfig, PerJoint, RobotConfig, SceneConfig, TrocarConfig
 from surgsim.plant import DEFAULT, PLANTS
 from surgsim.plant.base import PlantConfig
 from surgsim.plant.disturbances import DISTURBANCES
@@ -155,7 +156,7 @@ class Scenario(PartConfig):
 
     @model_validator(mode="after")
     def _fits_the_arm(self) -> Self:
-        check_lists(self, self.robot.name)
+        check_lists(self, self.robot)
         return self
 
     @model_validator(mode="after")
@@ -227,6 +228,8 @@ class Scenario(PartConfig):
         return data
 
     def sha256(self) -> str:
-        """Hash of the resolved scenario."""
-        text = json.dumps(self.resolved(), sort_keys=True, separators=(",", ":"))
+        """Hash of the resolved scenario; of an arm from a file its content counts, not where it stands."""
+        resolved = self.resolved()
+        robot = {key: Path(v).name if key in KINDS else v for key, v in resolved["robot"].items()}
+        text = json.dumps({**resolved, "robot": robot}, sort_keys=True, separators=(",", ":"))
         return hashlib.sha256(text.encode()).hexdigest()

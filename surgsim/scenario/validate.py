@@ -187,7 +187,7 @@ def _word(problem: Problem) -> str:
             return _not_a(problem, list(problem.shape.choices()))
         case "value_error" | "assertion_error" if "error" in problem.context:
             return one_line(" ".join(str(problem.context["error"]).split()), _LONGEST)
-        case "per_joint":
+        case "placed":
             return problem.message
         case "too_short" | "too_long" if isinstance(problem.value, list):
             return _wrong_length(problem)

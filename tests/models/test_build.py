@@ -8,8 +8,8 @@ from pydantic import ValidationError
 from surgsim.errors import SurgsimError
 from surgsim.models.build import Scene, build, build_arm
 from surgsim.models.config import InstrumentConfig, RobotConfig, SceneConfig, TrocarConfig
+from surgsim.models.folders import robot_names
 from surgsim.models.instrument import rod_masses
-from surgsim.models.robot import robot_names
 
 ROBOT = RobotConfig(name="lwr4plus")
 TROCAR = TrocarConfig(position_m=(0.1, 0.5, 0.25), axis=(0.0, -0.3, 1.0))

@@ -9,15 +9,8 @@ from surgsim.control.self_motion import elbow_swivel_rad
 from surgsim.models.arm import ArmModel
 from surgsim.models.build import Scene, build, build_arm
 from surgsim.models.config import RobotConfig, SceneConfig, TrocarConfig
-from surgsim.models.robot import (
-    arms_for_tests,
-    joint_names,
-    link_names,
-    motor_names,
-    robot_joints,
-    robot_names,
-    robot_spec,
-)
+from surgsim.models.folders import arms_for_tests, named_spec, robot_names
+from surgsim.models.robot import joint_names, link_names, motor_names, robot_joints
 from surgsim.scenario.load import load_scenario, shipped
 
 every_robot = pytest.mark.parametrize("name", robot_names())
@@ -28,15 +21,19 @@ def _arm(name: str) -> Scene:
     return build_arm(SceneConfig(robot=RobotConfig(name=name), instrument=None))
 
 
+def _joints(name: str) -> int:
+    return robot_joints(RobotConfig(name=name))
+
+
 def test_the_arms_and_their_joints():
-    assert {name: robot_joints(name) for name in robot_names()} == {"lwr4plus": 7, "panda": 7}
-    tested = {name: robot_joints(name) for name in arms_for_tests()}
+    assert {name: _joints(name) for name in robot_names()} == {"lwr4plus": 7, "panda": 7}
+    tested = {name: _joints(name) for name in arms_for_tests()}
     assert tested == {"test_arm_6": 6, "test_arm_7": 7, "test_arm_8": 8}
 
 
 @every_arm
 def test_names_follow_the_rules(name):
-    spec, n = robot_spec(name), robot_joints(name)
+    spec, n = named_spec(name, drawn=True), _joints(name)
     joints = [f"joint{i}" for i in range(1, n + 1)]
     assert spec.modelname == name
     assert [body.name for body in spec.bodies[1:]] == ["base", *(f"link{i}" for i in range(1, n + 1))]
@@ -86,7 +83,7 @@ def test_limits_are_whole_and_the_motors_are_torques(name):
         assert np.isfinite(limit).all()
         assert (limit > 0).all()
     for limit in (limits.jerk, limits.torque_rate):
-        assert limit.shape == (robot_joints(name),)
+        assert limit.shape == (_joints(name),)
         assert (limit > 0).all()
     np.testing.assert_array_equal(model.actuator_ctrlrange[:, 0], -limits.torque)
     np.testing.assert_array_equal(model.actuator_gear[:, 0], 1)
@@ -99,7 +96,7 @@ def test_limits_are_whole_and_the_motors_are_torques(name):
 @every_arm
 def test_every_link_is_physically_consistent(name):
     model = _arm(name).model
-    for body in ("base", *link_names(robot_joints(name))):
+    for body in ("base", *link_names(_joints(name))):
         index = model.body(body).id
         moments = model.body_inertia[index]
         # The pseudo-inertia is positive definite exactly when the mass is positive and so is each half sum

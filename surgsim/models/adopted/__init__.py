@@ -1,0 +1,1 @@
+"""Arms from other people's files: read, checked, and put into the form that the package's own arms have."""
