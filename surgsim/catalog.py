@@ -53,13 +53,18 @@ class PartConfig(BaseModel):
         """
 
 
-def _check_name(name: str) -> str:
+def check_name(name: str) -> str:
+    """`name`, if it is safe as a file's.
+
+    Raises:
+        ValueError: If it is not.
+    """
     if not re.fullmatch(r"[a-z0-9][a-z0-9_]{0,63}", name):
         raise ValueError(f"'{name}' must be lower-case letters, digits and underscores, at most 64")
     return name
 
 
-Name = Annotated[str, AfterValidator(_check_name)]
+Name = Annotated[str, AfterValidator(check_name)]
 """A name that is safe as a file's: of a scenario, a controller, a suite."""
 
 

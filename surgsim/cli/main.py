@@ -27,6 +27,7 @@ COMMANDS = (
     "inspect",
     "reproduce",
     "bench",
+    "adopt",
     "test-part",
     "completion",
 )

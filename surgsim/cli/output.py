@@ -157,6 +157,26 @@ def _batch_bar(label: str) -> Iterator[Callable[[int, int, str], None]]:
         yield update
 
 
+@contextmanager
+def show_count(label: str, noun: str, *, quiet: bool = False) -> Iterator[Callable[[int, int], None] | None]:
+    """Progress of something that is counted: a bar on a terminal, else a line every five seconds."""
+    if quiet:
+        yield None
+    elif sys.stderr.isatty():
+        with _bar(label) as bar:
+            yield lambda done, total: bar(done, total, f"{done}/{total} {noun}")
+    else:
+        last = time.perf_counter()
+
+        def tell(done: int, total: int) -> None:
+            nonlocal last
+            if time.perf_counter() - last >= 5.0:
+                last = time.perf_counter()
+                print(f"{label}: {done} of {total} {noun}", file=sys.stderr, flush=True)
+
+        yield tell
+
+
 class _BatchLines:
     """A plain line every five seconds, and at the end."""
 

@@ -12,6 +12,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from surgsim.models.adopted.capsules import capsules_in
 from surgsim.models.config import SceneConfig
 from surgsim.models.graft import asset
 from surgsim.models.robot import joint_names, link_names
@@ -21,7 +22,6 @@ Array = NDArray[np.float64]
 Ids = NDArray[np.intp]
 _ADAPTER_RADIUS_M = 0.026
 NEVER_TOUCH = "never_touch"
-_NUMBERS = 7  # of a capsule
 _NEXT_THAT_CAN_TOUCH = 3  # along the chain: nearer ones are held apart by the joints' ranges
 _TABLE_CENTRE_M, _TABLE_HALF_M = (0.0, -0.13, -0.223), (0.268, 0.98, 0.054)  # pads and top of the drawn table
 
@@ -80,8 +80,8 @@ def _capsules(model: mujoco.MjModel, body: str) -> list[tuple[Array, Array, floa
     """End points (3,) [m] in the body's frame and radius [m] of the capsules of an arm's body."""
     if mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_NUMERIC, f"capsule_{body}") < 0:
         return []
-    rows = np.array(model.numeric(f"capsule_{body}").data).reshape(-1, _NUMBERS)
-    return [(row[:3], row[3:6], float(row[6])) for row in rows]
+    found = capsules_in(model.numeric(f"capsule_{body}").data)
+    return [(*capsule.ends, capsule.radius) for capsule in found]
 
 
 def _left_out(model: mujoco.MjModel) -> set[tuple[str, str]]:

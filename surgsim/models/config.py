@@ -106,7 +106,8 @@ class RobotConfig(PartConfig):
         urdf: Or a URDF file.
         base_body: Body of the file that the base is; null: the root of the arm.
         joints: Joints of the file, from the base on; null: all from the base to the flange.
-        flange: Where the tool is fixed; null: the file's site or body `flange`, `attachment_site` or `tool0`.
+        flange: Where the tool is fixed: a site, else a body of that name, or a place; null: the file's site
+            or body `flange`, `attachment_site` or `tool0`.
         home_rad: A posture to prefer [rad]; null: the file's keyframe `home`.
         limits: Limits that the file lacks, or that count before its own.
         collision: `auto` fits capsules to the file's shapes; or a list of capsules.
@@ -122,7 +123,7 @@ class RobotConfig(PartConfig):
     urdf: str | None = None
     base_body: str | None = None
     joints: tuple[str, ...] | None = None
-    flange: FlangeConfig | None = None
+    flange: FlangeConfig | str | None = None
     home_rad: tuple[FiniteFloat, ...] | None = None
     limits: LimitsConfig = LimitsConfig()
     collision: Literal["auto"] | tuple[CapsuleConfig, ...] = "auto"

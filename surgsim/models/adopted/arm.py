@@ -1,7 +1,7 @@
 """An arm from a file, in the form that the package's own arms have."""
 
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -14,10 +14,15 @@ from surgsim.models.adopted.findings import Findings, read_arm
 from surgsim.models.adopted.form import add_text, draw, mechanics_of, write_capsules
 from surgsim.models.adopted.problem import AdoptionError
 from surgsim.models.adopted.surface import Surface, coarser
+from surgsim.models.adopted.written import mesh_name
 from surgsim.spatial import Array
 
 if TYPE_CHECKING:
     from surgsim.models.config import RobotConfig
+
+
+_MOST_DRAWN, _FEWEST_DRAWN = 6000, 200
+"""Triangles: of a link, and of each of its meshes."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -34,13 +39,22 @@ class Adopted:
     surfaces: dict[str, list[Surface]]
     card: Card
 
+    @cached_property
+    def drawn(self) -> dict[str, list[Surface]]:
+        """The surfaces as they are drawn: fine ones coarser."""
+        found = {}
+        for body, surfaces in self.surfaces.items():
+            total = sum(len(surface.faces) for surface in surfaces)
+            share = min(1.0, _MOST_DRAWN / max(total, 1))
+            found[body] = [coarser(s, max(_FEWEST_DRAWN, int(share * len(s.faces)))) for s in surfaces]
+        return found
+
     def spec(self, *, drawn: bool) -> mujoco.MjSpec:
         """A copy of the arm to be changed, with what is looked at if `drawn`."""
         spec = self.mechanics.copy()
-        if drawn:
-            for body, surfaces in self.surfaces.items():
-                for i, surface in enumerate(surfaces):
-                    draw(spec, body, f"{body}_{i}", coarser(surface))
+        for body, surfaces in self.drawn.items() if drawn else ():
+            for i, surface in enumerate(surfaces):
+                draw(spec, body, mesh_name(body, i), surface)
         return spec
 
 
@@ -63,7 +77,8 @@ def _adopted(robot: "RobotConfig") -> Adopted:
     capsules = find_capsules(found, points, robot)
     write_capsules(spec, capsules)
     apart, joined = pairs_left_out(spec, capsules, points, found.limits, home)
-    add_text(spec, "never_touch", " ".join(f"{a}-{b}" for a, b in (*apart, *joined)))
+    if pairs := (*apart, *joined):
+        add_text(spec, "never_touch", " ".join(f"{one}-{other}" for one, other in pairs))
     card = card_of(found, capsules, joined, remark)
     add_text(spec, "description", _described(found.file.path, card))
     return Adopted(mechanics=spec, surfaces=drawn, card=card)

@@ -7,10 +7,12 @@ would fit badly, such as one with an elbow, gets two or more.
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from surgsim.models.adopted.surface import thinned
 from surgsim.spatial import Array
 
+_NUMBERS = 2 * 3 + 1  # of a capsule in a model: its ends and its radius
 _DIRECTIONS = 96
 _WORTH = 0.75
 """Two capsules are taken for one where they fill less than this share of its volume."""
@@ -18,6 +20,7 @@ _SPLITS = 2
 """How often a link is cut in two at most: four capsules."""
 _SHARES = (0.2, 0.35, 0.5, 0.65, 0.8)
 _FEWEST_POINTS = 8
+_DIGITS = 4  # behind the point, of a number in metres
 _REFINED = 5  # times that axes nearer to the best are tried
 _CUT_CELL_M = 0.015
 
@@ -49,6 +52,12 @@ class Capsule:
             share = np.clip((points - self.ends[0]) @ along / square, 0.0, 1.0)
         depth: Array = self.radius - np.linalg.norm(points - self.ends[0] - share[:, None] * along, axis=1)
         return depth
+
+
+def capsules_in(numbers: ArrayLike) -> list[Capsule]:
+    """The capsules that a numeric of an arm's model holds: ends and radius of each."""
+    rows = np.reshape(numbers, (-1, _NUMBERS))
+    return [Capsule(ends=row[:-1].reshape(2, 3), radius=float(row[-1])) for row in rows]
 
 
 def capsules_around(points: Array, splits: int = _SPLITS) -> list[Capsule]:
@@ -115,8 +124,9 @@ def capsule_around(points: Array) -> Capsule:
         found = _best(corners, near / np.linalg.norm(near, axis=1, keepdims=True))
         best = min(best, found, key=lambda capsule: capsule.volume)
         spread /= 3.0
-    lacking = float(max(0.0, -best.depth(points).min()))
-    return Capsule(ends=best.ends, radius=best.radius + lacking)
+    best = Capsule(ends=np.round(best.ends, _DIGITS), radius=best.radius)
+    needed = best.radius - best.depth(points).min()
+    return Capsule(ends=best.ends, radius=float(np.ceil(needed * 10**_DIGITS) / 10**_DIGITS))
 
 
 def _quick(points: Array) -> Capsule:

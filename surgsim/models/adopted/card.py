@@ -89,7 +89,7 @@ def _left_out(found: Findings, joined: list[tuple[str, str]]) -> Iterator[str]:
     for name in found.links.welded:
         yield f"joint '{name}', which stays at its zero"
     if undrawn:
-        yield f"{len(undrawn)} meshes that are not there or of an unknown kind: {listed(undrawn, most=2)}"
+        yield f"meshes that are not there or of an unknown kind: {listed(undrawn, most=2)}"
     for one, other in joined:
         yield f"collisions of {one} with {other}, which overlap as they are drawn"
     if np.any(model.body_gravcomp):

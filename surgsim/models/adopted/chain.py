@@ -58,30 +58,40 @@ def find_chain(model: mujoco.MjModel, robot: "RobotConfig") -> Chain:
     return Chain(base=base, joints=tuple(joints), links=links, flange_body=flange_body, p_LF=p_LF, R_LF=R_LF)
 
 
-def _flange(model: mujoco.MjModel, flange: "FlangeConfig | None") -> tuple[int, Array, Array]:
+def _flange(model: mujoco.MjModel, flange: "FlangeConfig | str | None") -> tuple[int, Array, Array]:
     """Body, place and axes of the flange."""
     if flange is None:
-        return _known_flange(model)
+        flange = next((name for name in KNOWN_FLANGES if _place_named(model, name) is not None), None)
+    if flange is None or isinstance(flange, str):
+        return _named_flange(model, flange)
     if flange.site is not None:
         return _at_site(model, _id(model, "site", flange.site, "flange", "site"))
     body = _id(model, "body", flange.body or "", "flange", "body")
     return body, np.array(flange.position_m), _matrix(np.array(flange.quaternion_wxyz))
 
 
-def _known_flange(model: mujoco.MjModel) -> tuple[int, Array, Array]:
-    for name in KNOWN_FLANGES:
-        site = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_SITE, name)
-        if site >= 0:
-            return _at_site(model, site)
-    for name in KNOWN_FLANGES:
-        body = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, name)
-        if body > _WORLD:
-            return body, np.zeros(3), np.eye(3)
+def _place_named(model: mujoco.MjModel, name: str) -> tuple[int, Array, Array] | None:
+    """Body, place and axes of the site, else the body, of that name."""
+    site = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_SITE, name)
+    if site >= 0:
+        return _at_site(model, site)
+    body = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, name)
+    return (body, np.zeros(3), np.eye(3)) if body > _WORLD else None
+
+
+def _named_flange(model: mujoco.MjModel, name: str | None) -> tuple[int, Array, Array]:
+    place = None if name is None else _place_named(model, name)
+    if place is not None:
+        return place
     last = [body for body in range(1, model.nbody) if not np.any(model.body_parentid[1:] == body)]
-    raise AdoptionError(
+    lack = (
         f"the file does not say where its flange is: there is no site or body named "
-        f"{' or '.join(KNOWN_FLANGES)}. Give flange: {{site: NAME}} or {{body: NAME}}. Sites: "
-        f"{listed(model.site(i).name for i in range(model.nsite))}. Last bodies: "
+        f"{' or '.join(KNOWN_FLANGES)}; name one as flange"
+        if name is None
+        else f"the file has no site or body '{name}'"
+    )
+    raise AdoptionError(
+        f"{lack}. Sites: {listed(model.site(i).name for i in range(model.nsite))}. Last bodies: "
         f"{listed(model.body(i).name for i in last)}.",
         "flange",
     )

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 import mujoco
 import numpy as np
 
-from surgsim.models.adopted.capsules import Capsule, capsules_around
+from surgsim.models.adopted.capsules import Capsule, capsules_around, capsules_in
 from surgsim.models.adopted.findings import Findings
 from surgsim.models.adopted.form import flange_in_last_link
 from surgsim.models.adopted.limits import Limits
@@ -86,8 +86,7 @@ def _stated_capsules(found: Findings) -> dict[str, list[Capsule]] | None:
         numeric = f"capsule_{model.body(link.bodies[0]).name}"
         if mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_NUMERIC, numeric) < 0:
             return None
-        rows = np.array(model.numeric(numeric).data).reshape(-1, 7)
-        stated[name] = [Capsule(ends=row[:6].reshape(2, 3), radius=float(row[6])) for row in rows]
+        stated[name] = capsules_in(model.numeric(numeric).data)
     return stated
 
 

@@ -37,6 +37,23 @@ class ModelFile:
     undrawn: tuple[str, ...]
 
 
+def kind_of(path: Path) -> Kind:
+    """Which language a model file is in, by its first element.
+
+    Raises:
+        AdoptionError: If it is neither.
+    """
+    try:
+        tag = ET.parse(path).getroot().tag
+    except OSError as error:
+        raise AdoptionError(f"{path} cannot be read: {error.strerror}") from error
+    except ET.ParseError as error:
+        raise AdoptionError(f"{path} is no XML: {error}") from error
+    if tag not in ("mujoco", "robot"):
+        raise AdoptionError(f"{path} is neither MJCF nor URDF: its first element is <{tag}>")
+    return "mjcf" if tag == "mujoco" else "urdf"
+
+
 def read_file(path: Path, kind: Kind) -> ModelFile:
     """Read and compile the model at `path`.
 

@@ -124,4 +124,4 @@ def _add_numeric(spec: mujoco.MjSpec, name: str, values: Array) -> None:
 
 def add_text(spec: mujoco.MjSpec, name: str, text: str) -> None:
     """Put a text into the arm."""
-    spec.add_text(name=name, data=text or " ")
+    spec.add_text(name=name, data=text)

@@ -13,8 +13,6 @@ SPACING_M = 0.01
 """Greatest distance of the points that stand for a surface."""
 _AROUND = 16
 _MOST_CUTS = 200  # of an edge
-_MOST_DRAWN = 4000
-"""Triangles of one drawn mesh; a finer one is drawn coarser."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -122,7 +120,7 @@ def thinned(points: Array, cell_m: float) -> Array:
     return found
 
 
-def coarser(surface: Surface, most: int = _MOST_DRAWN) -> Surface:
+def coarser(surface: Surface, most: int) -> Surface:
     """A surface of at most about `most` triangles that looks alike: corners that are near become one."""
     if len(surface.faces) <= most:
         return surface

@@ -1,0 +1,171 @@
+"""A robot's folder: its MJCF and meshes, the card, and the map of ports."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from surgsim.adopt.picture import port_picture
+from surgsim.adopt.ports import DEPTH_M, RADIUS_M, PortMap, circle_through, map_ports
+from surgsim.errors import Outcome, SurgsimError
+from surgsim.models.adopted.arm import adopted
+from surgsim.models.adopted.card import Card
+from surgsim.models.adopted.written import model_files
+from surgsim.models.config import RobotConfig
+from surgsim.recording.files import write_file
+from surgsim.recording.folders import make_folder, sync_tree
+from surgsim.runs.drafts import draft_of
+from surgsim.runs.exchange import put_in_place
+from surgsim.runs.folder import RunResult, execute
+
+CARD, MAP = "README.md", "ports.png"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Trial:
+    """A circle through the port with the most room, as a check.
+
+    Attributes:
+        port_m: The port in the frame of the base [m].
+        result: The run.
+    """
+
+    port_m: tuple[float, float, float]
+    result: RunResult
+
+    @property
+    def told(self) -> str:
+        """How it went."""
+        metrics, ending = self.result.metrics, self.result.trace.meta.ending
+        place = ", ".join(f"{x:.2f}" for x in self.port_m)
+        tip, rcm = metrics["tip_error_max_mm"], metrics["rcm_error_max_mm"]
+        errors = "" if tip is None or rcm is None else f"; tip at most {tip:.3g} mm off, shaft {rcm:.3g} mm"
+        return f"circle through a port at ({place}) m: {ending.outcome.name.lower()}{errors}"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Adoption:
+    """What became of a model file.
+
+    Attributes:
+        name: What the arm is called.
+        robot: The file, and what was said about it.
+        card: What was found in it.
+        ports: Where a port can be; None if that was not asked for.
+        trial: A run as a check; None without a port that can be reached.
+    """
+
+    name: str
+    robot: RobotConfig
+    card: Card
+    ports: PortMap | None
+    trial: Trial | None
+
+    @property
+    def works(self) -> bool:
+        """Whether a circle was followed to its end."""
+        return self.trial is not None and self.trial.result.trace.meta.ending.outcome is Outcome.COMPLETED
+
+
+def adopt(
+    robot: RobotConfig, name: str, *, mapped: bool, progress: Callable[[int, int], None] | None = None
+) -> Adoption:
+    """Look at an arm's file, and where it can work.
+
+    Args:
+        robot: The file, and what is said about it.
+        name: What the arm is to be called.
+        mapped: Whether ports are tried, and a circle is run.
+        progress: Told how many ports were tried, and of how many.
+    """
+    card = adopted(robot).card
+    if not mapped:
+        return Adoption(name=name, robot=robot, card=card, ports=None, trial=None)
+    ports = map_ports(robot, card.reach_m, progress)
+    trial = None
+    if ports.best_m is not None:
+        x, z = ports.best_m
+        port = (x, 0.0, z)
+        trial = Trial(port_m=port, result=execute(circle_through(robot, port)))
+    return Adoption(name=name, robot=robot, card=card, ports=ports, trial=trial)
+
+
+def write_robot_folder(folder: Path, adoption: Adoption) -> None:
+    """Write the arm's folder in one step; one that is there is replaced if it is a robot's.
+
+    Raises:
+        SurgsimError: If the folder holds something else, or the disk refuses.
+    """
+    name = adoption.name
+    if folder.exists() and not (folder / f"{name}.xml").is_file():
+        raise SurgsimError(
+            f"{folder} is there and is no folder of robot '{name}': give another --out or --name"
+        )
+    arm = adopted(adoption.robot)
+    files = model_files(arm.mechanics, name, arm.drawn, ["Written by surgsim adopt.", *_origin(adoption)])
+    files[CARD] = card_text(adoption).encode()
+    if adoption.ports is not None:
+        files[MAP] = port_picture(adoption.ports, name)
+    try:
+        make_folder(folder.parent)
+        with draft_of(folder) as draft:
+            for place, content in files.items():
+                (draft / place).parent.mkdir(exist_ok=True)
+                write_file(draft / place, content)
+            sync_tree(draft)
+            put_in_place(draft, folder)
+    except OSError as error:
+        raise SurgsimError(f"{folder} cannot be written: {error.strerror or error}") from error
+
+
+def _origin(adoption: Adoption) -> list[str]:
+    path, kind = adoption.robot.file
+    return [
+        f"From the {kind.upper()} file {path.name}; the file and all that it names have the hash",
+        _sha(adoption),
+    ]
+
+
+def _sha(adoption: Adoption) -> str:
+    return f"sha256 {adoption.robot.files_sha256}"
+
+
+def card_rows(adoption: Adoption) -> list[tuple[str, str]]:
+    """What there is to say about the arm: what, and what of it."""
+    card, ports = adoption.card, adoption.ports
+    rows = [
+        ("joints", f"{len(card.joints)}: {', '.join(card.joints)}"),
+        ("links", ", ".join(card.links)),
+        ("redundancy", f"{card.redundancy} with tip and shaft held{_roll(card)}"),
+        ("mass", f"{card.mass_kg:.2f} kg without the base"),
+        ("reach", f"{card.reach_m:.3f} m from the second joint to the flange, stretched"),
+        ("collisions", f"looked for between {card.capsules} capsules"),
+        *((f"{what} limits", source) for what, source in card.sources.items()),
+        *(("assumed", line) for line in card.assumed),
+        *(("left out", line) for line in card.left_out),
+        *(("lacking", line) for line in card.lacking),
+    ]
+    if ports is not None:
+        tried = ports.margin_rad.size
+        rows.append(("ports", f"{ports.reached} of {tried} upright ones in front of the base can be used"))
+        rows += [("no port", f"{count} times: {reason}") for reason, count in _most(ports.reasons)]
+    if adoption.trial is not None:
+        rows.append(("check", adoption.trial.told))
+    return rows
+
+
+def _most(reasons: dict[str, int], most: int = 3) -> Sequence[tuple[str, int]]:
+    return sorted(reasons.items(), key=lambda item: -item[1])[:most]
+
+
+def _roll(card: Card) -> str:
+    return "; the last joint rolls the shaft" if card.rolls_shaft else ""
+
+
+def card_text(adoption: Adoption) -> str:
+    """The card as a page."""
+    lines = [f"# {adoption.name}", "", *_origin(adoption), "", "| what | |", "|---|---|"]
+    lines += [f"| {what} | {text} |" for what, text in card_rows(adoption)]
+    if adoption.ports is not None:
+        about = f"a circle of {1e3 * RADIUS_M:.0f} mm, {1e3 * DEPTH_M:.0f} mm below the port"
+        lines += ["", f"Where a port can be, for {about}:", "", f"![ports]({MAP})"]
+    return "\n".join(lines) + "\n"
