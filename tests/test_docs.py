@@ -90,11 +90,19 @@ def test_links_and_pictures_lead_somewhere(page):
     assert broken == []
 
 
+def saved_files():
+    """Name and content of every model file that a page tells a reader to save: scenarios name them."""
+    pages = "".join(page.read_text() for page in PAGES)
+    return re.findall(r"Save this as `([\w.]+)`[^\n]*\n\n```xml\n(.*?)^```$", pages, re.M | re.S)
+
+
 @pytest.mark.parametrize("text", blocks("yaml"))
 def test_yaml_examples_are_valid(text, tmp_path):
     tree = parse_yaml(text, "example").tree
     path = tmp_path / "example.yaml"
     path.write_text(text)
+    for file, content in saved_files():
+        (tmp_path / file).write_text(content)
     if "robot" in tree:
         prepare(load_scenario(str(path)))
     elif "resolver" in tree:

@@ -96,7 +96,9 @@ def commands(page):
 
 def files(page):
     """Name and content of every file that a page tells a reader to save."""
-    return re.findall(r"^Save this as `([\w.]+)`.*?\n```yaml\n(.*?)^```$", page.read_text(), re.M | re.S)
+    return re.findall(
+        r"^Save this as `([\w.]+)`.*?\n```(?:yaml|xml)\n(.*?)^```$", page.read_text(), re.M | re.S
+    )
 
 
 def plain(command):

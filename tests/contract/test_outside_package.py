@@ -285,7 +285,7 @@ def test_parts_that_cannot_be_used_are_named_and_nothing_else_stops(surgsim, tmp
     modules = {"my_lab": GOOD, "bad_lab": BAD, "broken_lab": "1 / 0\n"}
     install(tmp_path / "site", "odd-lab", POINTS, **modules)
     odd = "of the package odd-lab 1.0"
-    groups = "disturbances, plants, policies, port_estimators, props, resolvers, tasks, torque_laws"
+    groups = "disturbances, plants, policies, port_estimators, props, resolvers, robots, tasks, torque_laws"
     known = ", ".join(f"surgsim.{name}" for name in groups.split(", "))
     hint = "'surgsim.resolver' is not a group of entry points. Known: {}. Did you mean 'surgsim.resolvers'?"
     absent = f"resolver 'absent' {odd} does not load: No module named 'nowhere_at_all'"
