@@ -18,6 +18,7 @@ GROUPS = (
     "surgsim.plants",
     "surgsim.policies",
     "surgsim.robots",
+    "surgsim.metrics",
 )
 """The entry-point groups that surgsim reads."""
 _OURS = "surgsim."

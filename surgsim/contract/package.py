@@ -6,10 +6,12 @@ from typing import Any
 from surgsim.catalog import Catalog
 from surgsim.contract import (
     configs,
+    metrics,
     plant_parts,
     policies,
     port_estimators,
     resolvers,
+    robots,
     tasks,
     torque_laws,
 )
@@ -20,6 +22,11 @@ from surgsim.control.port_estimators import PORT_ESTIMATORS
 from surgsim.control.resolvers import RESOLVERS
 from surgsim.control.torque_laws import TORQUE_LAWS
 from surgsim.errors import SurgsimError, told, unknown_name
+from surgsim.metrics.catalog import SHIPPED
+from surgsim.metrics.outside import GROUP as METRICS
+from surgsim.metrics.outside import load_metric
+from surgsim.models.folders import GROUP as ROBOTS
+from surgsim.models.folders import robot_file, shipped_robots
 from surgsim.plant import PLANTS
 from surgsim.plant.disturbances import DISTURBANCES
 from surgsim.plant.props import PROPS
@@ -37,6 +44,7 @@ CHECKS: dict[str, tuple[Check, ...]] = {
     PLANTS.kind: plant_parts.PLANT_CHECKS,
 }
 _BY_GROUP = {catalog.group: catalog for catalog in CATALOGS}
+_OTHER_KINDS = {POLICIES: "policy", METRICS: "metric", ROBOTS: "robot"}
 _LOADS = "is found and loads"
 
 
@@ -69,16 +77,32 @@ def _plain(name: str) -> str:
 
 def _of_offer(offer: Offer, unread: str | None) -> Iterator[Result]:
     catalog = _BY_GROUP.get(offer.group)
-    kind = catalog.kind if catalog else "policy" if offer.group == POLICIES else offer.group
+    kind = catalog.kind if catalog else _OTHER_KINDS.get(offer.group, offer.group)
     if unread is not None:
         yield Result(kind=kind, part=offer.name, check=_LOADS, passed=False, detail=unread)
-    elif catalog is None:
+    elif offer.group == POLICIES:
         yield from _run(kind, offer.name, lambda: find_policy(offer.name), policies.CHECKS)
+    elif offer.group == METRICS:
+        yield from _run(kind, offer.name, lambda: load_metric(offer, SHIPPED), metrics.CHECKS)
+    elif catalog is None:
+        yield from _run(kind, offer.name, lambda: _robot(offer.name), robots.CHECKS)
     elif offer.name in catalog.places:
         detail = f"the name is that of a shipped {kind}, which hides it"
         yield Result(kind=kind, part=offer.name, check=_LOADS, passed=False, detail=detail)
     else:
         yield from _run(kind, offer.name, lambda: catalog.loaded(offer.name), checks_of(catalog))
+
+
+def _robot(name: str) -> str:
+    """The name of a robot that this package brings.
+
+    Raises:
+        SurgsimError: If its folder is not found, or a shipped robot hides it.
+    """
+    if name in shipped_robots():
+        raise SurgsimError("the name is that of a shipped robot, which hides it")
+    robot_file(name)
+    return name
 
 
 def _run(kind: str, part: str, load: Callable[[], Any], checks: tuple[Check, ...]) -> Iterator[Result]:

@@ -17,9 +17,10 @@ from surgsim.metrics import (
     timing,
 )
 from surgsim.metrics.metric import Metric, Undefined
+from surgsim.metrics.outside import outside_metrics
 from surgsim.trace.trace import Trace
 
-GROUPS: tuple[tuple[Metric, ...], ...] = tuple(
+_SHIPPED: tuple[tuple[Metric, ...], ...] = tuple(
     tuple(group.METRICS)
     for group in (
         accuracy,
@@ -34,7 +35,11 @@ GROUPS: tuple[tuple[Metric, ...], ...] = tuple(
         timing,
     )
 )
-"""Metrics of one subject, in the order in which they are printed."""
+SHIPPED = frozenset(metric.name for group in _SHIPPED for metric in group)
+"""Names of the metrics that are not of other packages."""
+_outside = tuple(outside_metrics(SHIPPED).values())
+GROUPS = (*_SHIPPED, *([_outside] if _outside else []))
+"""Metrics of one subject, in the order in which they are printed; last those of other packages."""
 
 _LONGEST_REASON = 300
 METRICS: dict[str, Metric] = {metric.name: metric for group in GROUPS for metric in group}

@@ -24,7 +24,7 @@ from surgsim.catalog import PartConfig
 from surgsim.models.adopted.arm import adopted
 from surgsim.models.adopted.file import Kind, files_sha256
 from surgsim.models.adopted.problem import AdoptionError
-from surgsim.models.folders import known_robot, with_literal_variant
+from surgsim.models.folders import is_shipped, known_robot, robot_file, with_literal_variant
 
 Vec3 = tuple[FiniteFloat, FiniteFloat, FiniteFloat]
 
@@ -111,7 +111,8 @@ class RobotConfig(PartConfig):
         home_rad: A posture to prefer [rad]; null: the file's keyframe `home`.
         limits: Limits that the file lacks, or that count before its own.
         collision: `auto` fits capsules to the file's shapes; or a list of capsules.
-        files_sha256: Hash of the file and all that it names; filled in, and checked where it is given.
+        files_sha256: Hash of the file and all that it names, of a robot's folder that is not shipped too;
+            filled in, and checked where it is given.
         base_position_m: Of the base in the world [m].
         base_yaw_rad: Turn of the base about the vertical [rad].
         dh_variant: `literal` takes d2 as Table 3 of the manipulability paper prints it, a misprint: for
@@ -137,19 +138,20 @@ class RobotConfig(PartConfig):
         if sum(place is not None for place in (self.name, self.mjcf, self.urdf)) != 1:
             raise ValueError("give one of name, mjcf and urdf")
         if self.name is not None:
-            strange = [key for key in OF_FILES if getattr(self, key) != type(self).model_fields[key].default]
+            keys = OF_FILES if is_shipped(self.name) else OF_FILES[: -len(HASH)]
+            strange = [key for key in keys if getattr(self, key) != type(self).model_fields[key].default]
             if strange:
                 raise ValueError(f"{strange[0]} is for an arm from a file; '{self.name}' has its own")
         if self.dh_variant == "literal" and self.name not in (known := with_literal_variant()):
             raise ValueError(f"dh_variant 'literal' is of '{', '.join(known)}' alone, not of '{self.label}'")
-        if self.name is None:
+        if self.name is None or not is_shipped(self.name):
             with placed_errors():
                 self._read_file()
         return self
 
     def _read_file(self) -> None:
         """Fill in the file's whole path and the hash of what it holds, and see that it is an arm."""
-        path, kind = self.file
+        path, kind = self.file if self.name is None else (robot_file(self.name), KINDS[0])
         found = files_sha256(path, kind)
         if self.files_sha256 not in (None, found):
             raise AdoptionError(
@@ -157,17 +159,19 @@ class RobotConfig(PartConfig):
                 f"out to take it as it now is",
                 "files_sha256",
             )
-        for key, value in ((kind, os.path.abspath(path)), ("files_sha256", found)):
-            object.__setattr__(self, key, value)  # frozen, but still being made
-        adopted(self)
+        object.__setattr__(self, "files_sha256", found)  # frozen, but still being made
+        if self.name is None:
+            object.__setattr__(self, kind, os.path.abspath(path))
+            adopted(self)
 
     @model_serializer(mode="wrap")
     def _without_what_has_no_use(self, write: SerializerFunctionWrapHandler) -> dict[str, Any]:
         """Of an arm with a name the keys for files say nothing, and of one from a file the other places."""
         every: dict[str, Any] = write(self)
-        idle = OF_FILES if self.name is not None else ("name",)
+        idle = OF_FILES[: -len(HASH)] if self.name is not None else ("name",)
+        optional = (*PLACES, *HASH)
         return {
-            key: v for key, v in every.items() if key not in idle and (key not in PLACES or v is not None)
+            key: v for key, v in every.items() if key not in idle and (key not in optional or v is not None)
         }
 
     @property
@@ -195,7 +199,7 @@ class RobotConfig(PartConfig):
 
 
 KINDS: tuple[Kind, ...] = ("mjcf", "urdf")
-PLACES = ("name", *KINDS)
+PLACES, HASH = ("name", *KINDS), ("files_sha256",)
 OF_FILES = (
     "mjcf",
     "urdf",
@@ -205,9 +209,9 @@ OF_FILES = (
     "home_rad",
     "limits",
     "collision",
-    "files_sha256",
+    *HASH,
 )
-"""Keys that are for an arm from a file alone."""
+"""Keys that are for an arm from a file alone; the last one also for a robot's folder that is not shipped."""
 
 
 @contextmanager

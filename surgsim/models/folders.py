@@ -40,6 +40,11 @@ def shipped_robots() -> list[str]:
     return sorted(_files(_shipped(ROBOTS)))
 
 
+def is_shipped(name: str) -> bool:
+    """Whether the arm of that name comes with the package."""
+    return name in shipped_robots() or name in arms_for_tests()
+
+
 def arms_for_tests() -> list[str]:
     """Names of the arms that are for tests alone, sorted: by their number of joints."""
     return sorted(_files(_shipped(TEST_ARMS)))

@@ -1,5 +1,6 @@
 """Put one MJCF model into another without changing what its parts are called."""
 
+import os
 from functools import lru_cache
 from pathlib import Path
 
@@ -21,11 +22,13 @@ def read_mjcf(file: Path, *, drawn: bool = True) -> mujoco.MjSpec:
     Raises:
         ValueError: If MuJoCo cannot read it.
     """
-    return _read(str(file), drawn).copy()
+    return _read(str(file), drawn, os.stat(file).st_mtime_ns).copy()
 
 
 @lru_cache(maxsize=32)
-def _read(file: str, drawn: bool) -> mujoco.MjSpec:
+def _read(file: str, drawn: bool, changed_ns: int) -> mujoco.MjSpec:
+    """The file as it was when it was changed last."""
+    del changed_ns  # of the key alone
     spec = mujoco.MjSpec.from_file(file)
     if not drawn:
         for geom in list(spec.geoms):

@@ -23,9 +23,11 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike
 
+from surgsim.errors import SurgsimError
 from surgsim.models.adopted.arm import adopted
+from surgsim.models.adopted.chain import FEWEST, MOST
 from surgsim.models.config import RobotConfig
-from surgsim.models.folders import LITERAL_D2, named_spec
+from surgsim.models.folders import LITERAL_D2, is_shipped, named_spec
 from surgsim.spatial import Array
 
 
@@ -117,11 +119,35 @@ def robot_spec(robot: RobotConfig, *, drawn: bool = True) -> mujoco.MjSpec:
     if robot.name is None:
         return adopted(robot).spec(drawn=drawn)
     spec = named_spec(robot.name, drawn=drawn)
+    if not is_shipped(robot.name) and (lack := what_is_missing(spec)):
+        raise SurgsimError(f"robot '{robot.name}' has not the form of an arm: {lack}")
     if robot.dh_variant == "literal":
         axis = np.array(spec.joint("joint2").axis)
         link = spec.body("link3")
         link.pos = np.array(link.pos) + float(spec.numeric(LITERAL_D2).data[0]) * axis
     return spec
+
+
+def what_is_missing(spec: mujoco.MjSpec) -> str | None:
+    """What an arm has not, or has too much, of the form that this module states; None if nothing."""
+    n = len(joint_names(spec))
+    if not FEWEST <= n <= MOST:
+        return f"it has {n} joints named joint1, joint2 and so on, not {FEWEST} to {MOST}"
+    if len(spec.joints) != n:
+        return "it has joints beside those of the arm"
+    parts = (
+        ("body", spec.bodies, ("base", *link_names(n))),
+        ("motor", spec.actuators, motor_names(n)),
+        ("site", spec.sites, ("flange",)),
+        ("text", spec.texts, ("description",)),
+        ("numeric", spec.numerics, ("velocity_limit_rad_per_s", "acceleration_limit_rad_per_s2")),
+    )
+    for kind, there, wanted in parts:
+        names = {part.name for part in there}
+        missing = [name for name in wanted if name not in names]
+        if missing:
+            return f"there is no {kind} {', '.join(missing)}"
+    return None
 
 
 def home_of(model: mujoco.MjModel) -> Array | None:

@@ -3,21 +3,25 @@
 import math
 from collections.abc import Mapping
 
+from surgsim.metrics.catalog import SHIPPED
+
 _RELATIVE_TOLERANCE = 1e-9  # other versions of NumPy may sum in another order
 
 
 def differences(stored: Mapping[str, float | None], recomputed: Mapping[str, float | None]) -> list[str]:
     """Say in words where the two differ; nothing when they agree.
 
+    A metric of another package that is installed on one side alone is no difference.
+
     Args:
         stored: Metrics read from a file; None where one does not apply.
         recomputed: Metrics of the trace beside them.
     """
     found = []
-    for name in sorted({*stored, *recomputed}):
-        if name not in recomputed:
-            found.append(f"{name}: stored {_text(stored[name])}, not known to this surgsim")
-        elif name not in stored:
+    for name in sorted(recomputed):
+        if name not in stored and name not in SHIPPED:
+            continue
+        if name not in stored:
             found.append(f"{name}: not stored, the trace gives {_text(recomputed[name])}")
         elif not _same(stored[name], recomputed[name]):
             found.append(f"{name}: stored {_text(stored[name])}, the trace gives {_text(recomputed[name])}")

@@ -12,13 +12,14 @@ from surgsim.catalog import PartConfig
 from surgsim.control.policies.registry import find_policy
 from surgsim.control.resolvers.policy import PolicyConfig
 from surgsim.errors import SurgsimError
-from surgsim.plugins import all_offers
+from surgsim.metrics.outside import GROUP as METRICS
+from surgsim.plugins import all_offers, offers
 from surgsim.runs.sources import hash_of, package_sha256
 from surgsim.scenario.schema import Scenario
 
 
 def plugins_of(scenario: Scenario) -> dict[str, dict[str, Any]]:
-    """Version and hash of the sources of each package, other than surgsim, that gave a part to `scenario`.
+    """Version and hash of the sources of each other package that gave `scenario` a part, or its run a metric.
 
     A module that belongs to no installed package has no version.
     """
@@ -28,6 +29,10 @@ def plugins_of(scenario: Scenario) -> dict[str, dict[str, Any]]:
             package = module.partition(".")[0]
             if package != "surgsim" and (told := _told(package)):
                 found[package] = told
+    for offer in offers(METRICS).values():
+        package = offer.place.partition(":")[0].partition(".")[0]
+        if told := _told(package):
+            found[package] = told
     return dict(sorted(found.items()))
 
 

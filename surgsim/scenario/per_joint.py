@@ -7,6 +7,7 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticCustomError
 
+from surgsim.errors import SurgsimError
 from surgsim.models.config import ForEachJoint, RobotConfig
 from surgsim.models.robot import robot_joints
 from surgsim.scenario.wording import show, unwrap
@@ -19,7 +20,10 @@ def check_lists(config: BaseModel, robot: RobotConfig) -> None:
     Raises:
         PydanticCustomError: For the first one; its context has the list's place in `config` as `at`.
     """
-    n = robot_joints(robot)
+    try:
+        n = robot_joints(robot)
+    except SurgsimError as error:
+        raise PydanticCustomError("placed", "{text}", {"text": str(error), "at": ("robot",)}) from error
     for path, values in _lists(config):
         if len(values) != n:
             count = f"{len(values)} item{'' if len(values) == 1 else 's'}"

@@ -10,9 +10,7 @@ from pydantic import Field, NonNegativeInt, PositiveFloat, model_validator
 
 from surgsim.catalog import Name, PartConfig
 from surgsim.control.controller import ControllerConfig
-from surgsim.models.adopted.file import files_sha256
 from surgsim.models.config import KINDS, InstrumentConfig, PerJoint, RobotConfig, SceneConfig, TrocarConfig
-from surgsim.models.folders import arms_for_tests, robot_file, shipped_robots
 from surgsim.plant import DEFAULT, PLANTS
 from surgsim.plant.base import PlantConfig
 from surgsim.plant.disturbances import DISTURBANCES
@@ -230,10 +228,8 @@ class Scenario(PartConfig):
         return data
 
     def sha256(self) -> str:
-        """Hash of the resolved scenario; of an arm that is not shipped its files count, not their place."""
+        """Hash of the resolved scenario; of an arm from a file its content counts, not where it stands."""
         resolved = self.resolved()
         robot = {key: Path(v).name if key in KINDS else v for key, v in resolved["robot"].items()}
-        if self.robot.name is not None and self.robot.name not in (*shipped_robots(), *arms_for_tests()):
-            robot["files_sha256"] = files_sha256(robot_file(self.robot.name), "mjcf")
         text = json.dumps({**resolved, "robot": robot}, sort_keys=True, separators=(",", ":"))
         return hashlib.sha256(text.encode()).hexdigest()

@@ -1,6 +1,7 @@
 """A model file becomes a robot's folder, and the folder a robot with a name."""
 
 import json
+import re
 
 import numpy as np
 import pytest
@@ -9,6 +10,8 @@ from foreign_arms import NAMES, write_mjcf, write_urdf
 from surgsim.adopt import ports
 from surgsim.adopt.folder import adopt
 from surgsim.cli.main import main
+from surgsim.contract import robots
+from surgsim.contract.check import BrokenPromiseError
 from surgsim.errors import SurgsimError
 from surgsim.models import folders
 from surgsim.models.build import build
@@ -79,6 +82,15 @@ def test_a_scenario_knows_it_by_name_and_by_what_it_holds(tmp_path, named, capsy
     assert "From arm.xml: 7 joints" in capsys.readouterr().out
 
 
+def test_a_folder_that_is_no_arm_is_refused_by_what_it_lacks(tmp_path, named):
+    _adopted(tmp_path, named, "--name", "their_arm")
+    file = named / "their_arm" / "their_arm.xml"
+    file.write_text(file.read_text().replace('name="flange"', 'name="flansch"'))
+    content = {"name": "a", "robot": {"name": "their_arm"}, "task": {"type": "circle"}, "controller": "pinv"}
+    with pytest.raises(SurgsimError, match="'their_arm' has not the form of an arm: there is no site flange"):
+        load_scenario(content)
+
+
 def test_what_it_cannot_write_over_it_leaves(tmp_path, named, capsys):
     (named / "their_arm").mkdir(parents=True)
     (named / "their_arm" / "notes.txt").write_text("mine")
@@ -128,6 +140,13 @@ def test_a_package_offers_a_robot(tmp_path, named, monkeypatch):
     monkeypatch.setattr(folders, "offers", lambda group: {"their_arm": offer, "lost": other})
     assert "their_arm" in robot_names()
     assert robot_file("their_arm") == package / "their_arm" / "their_arm.xml"
+    for check in robots.CHECKS:
+        check.run("their_arm")
+    text = robot_file("their_arm").read_text()
+    limits = re.search(r'<numeric name="velocity_limit_rad_per_s".*?/>', text)[0]
+    robot_file("their_arm").write_text(text.replace(limits, limits.replace("3.14159", "0", 1)))
+    with pytest.raises(BrokenPromiseError, match="velocity is not above zero"):
+        robots.has_limits("their_arm")
     with pytest.raises(SurgsimError, match="robot 'lost' of the package lab 1"):
         robot_file("lost")
 

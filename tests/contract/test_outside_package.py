@@ -9,12 +9,15 @@ from pathlib import Path
 
 import pytest
 
+from surgsim.plugins import GROUPS
+
 GOOD = '''
 """Parts that keep their promises."""
 from typing import Literal
 from surgsim.control.port_estimators.tracking import TrackingConfig
 from surgsim.control.resolvers.pinv import PinvConfig
 from surgsim.control.torque_laws.joint_impedance import JointImpedanceConfig
+from surgsim.metrics.metric import Metric
 from surgsim.plant.disturbances.payload import PayloadConfig
 from surgsim.plant.dynamic import DynamicPlantConfig
 from surgsim.plant.props.contact_wall import ContactWallConfig
@@ -51,6 +54,13 @@ class Plant(DynamicPlantConfig):
 def policy(observation):
     """Go where the command goes."""
     return observation["command_velocity"].copy()
+
+metric = Metric(
+    name="my_metric",
+    heading="rows",
+    meaning="number of control ticks of the run",
+    compute=lambda trace: float(len(trace)),
+)
 '''
 BAD = '''
 """Parts that break a promise each."""
@@ -60,6 +70,7 @@ from typing import Literal
 import numpy as np
 from surgsim.catalog import PartConfig
 from surgsim.control.problem import Resolution
+from surgsim.metrics.metric import Metric
 from surgsim.plant.part import PlantPart
 from surgsim.tasks.base import TimedTask, TipCommand
 
@@ -132,6 +143,10 @@ class Misnamed(PartConfig):
 
 def policy(observation):
     return np.zeros(2)
+
+metric = Metric(
+    name="bad_metric", heading="luck", meaning="another number each time", compute=lambda _: random.random()
+)
 '''
 KINDS = {
     "resolvers": "Resolver",
@@ -142,6 +157,7 @@ KINDS = {
     "props": "Prop",
     "plants": "Plant",
     "policies": "policy",
+    "metrics": "metric",
 }
 
 
@@ -198,6 +214,7 @@ def test_good_parts_of_every_kind_keep_every_promise(surgsim, tmp_path):
         "prop",
         "plant",
         "policy",
+        "metric",
     }
     assert all(row["passed"] and row["detail"] == "" for row in rows)
     assert len([row for row in rows if row["part"] == "my_resolver"]) == 10
@@ -214,6 +231,7 @@ BROKEN = {
     ),
     "bad_prop": ("is deterministic under a seed", "6 joints: RuntimeError: no wood left"),
     "bad_plant": ("every key has a default", "must"),
+    "bad_metric": ("gives a number or none, and the same again", "the same run gives 0."),
     "bad_policy": (
         "actions are finite, of one shape",
         "6 joints: an action has the shape (2,), not (3,) or (6,)",
@@ -269,6 +287,36 @@ def test_a_part_for_seven_joints_alone_is_told_so(surgsim, tmp_path):
     assert redundancy == {"wasteful": "needs_redundancy is 4; an arm of eight joints has 3 with a trocar"}
 
 
+def test_a_metric_of_a_package_is_a_metric_of_every_run(surgsim, tmp_path):
+    install(tmp_path / "site", "my-lab", "[surgsim.metrics]\nmy_metric = my_lab:metric\n", my_lab=GOOD)
+    short = ("--set", "task.duration_s=2.0", "--set", "task.hold_end_s=0.0")
+    names = ("--controllers", "pinv,gradient", "--metric", "my_metric", "--out", "batch", "--record")
+    compared = surgsim("compare", "circle_lwr4plus", *short, *names)
+    assert compared.returncode == 0, compared.stderr
+    assert "by rows" in compared.stdout
+    run = next((tmp_path / "batch").rglob("metrics.json"))
+    stored = json.loads(run.read_text())
+    assert stored["metrics"]["my_metric"] > 2000.0
+    assert stored["provenance"]["plugins"]["my_lab"]["version"] == "1.0"
+    assert surgsim("inspect", str(run.parent)).returncode == 0
+    (tmp_path / "site" / "my_lab-1.0.dist-info" / "entry_points.txt").unlink()
+    assert surgsim("inspect", str(run.parent)).returncode == 0  # as it was, without that metric
+    assert surgsim("report", "batch").returncode == 0
+
+
+def test_a_metric_that_cannot_be_used_is_named(surgsim, tmp_path):
+    entries = "[surgsim.metrics]\nsparc = my_lab:metric\nother = my_lab:metric\nno = my_lab:nothing\n"
+    install(tmp_path / "site", "my-lab", entries, my_lab=GOOD)
+    listed = surgsim("list", "metrics")
+    assert listed.returncode == 0
+    by = "of the package my-lab 1.0"
+    said = listed.stderr.splitlines()
+    assert f"surgsim: metric 'sparc' {by}: the name is that of a shipped metric; it is not computed" in said
+    assert any(line.startswith(f"surgsim: metric 'other' {by} calls itself 'my_metric'") for line in said)
+    assert any(line.startswith(f"surgsim: metric 'no' {by} does not load") for line in said)
+    assert surgsim("test-part", "my-lab").returncode == 1
+
+
 POINTS = """
 [surgsim.resolver]
 one = my_lab:Resolver
@@ -285,8 +333,7 @@ def test_parts_that_cannot_be_used_are_named_and_nothing_else_stops(surgsim, tmp
     modules = {"my_lab": GOOD, "bad_lab": BAD, "broken_lab": "1 / 0\n"}
     install(tmp_path / "site", "odd-lab", POINTS, **modules)
     odd = "of the package odd-lab 1.0"
-    groups = "disturbances, plants, policies, port_estimators, props, resolvers, robots, tasks, torque_laws"
-    known = ", ".join(f"surgsim.{name}" for name in groups.split(", "))
+    known = ", ".join(sorted(GROUPS))
     hint = "'surgsim.resolver' is not a group of entry points. Known: {}. Did you mean 'surgsim.resolvers'?"
     absent = f"resolver 'absent' {odd} does not load: No module named 'nowhere_at_all'"
     misnamed = f"resolver 'misnamed' {odd} (Misnamed) needs the field type: Literal['misnamed']"
