@@ -24,7 +24,7 @@ from numba.core.serialize import dumps
 
 from surgsim.compiled import watch
 from surgsim.compiled.identity import UnknownValueError, identity
-from surgsim.compiled.library import KernelLibrary, expect, rebuilt
+from surgsim.compiled.library import KernelLibrary, defined_by, expect, rebuilt
 from surgsim.compiled.lock import CompileLock
 from surgsim.compiled.places import places, prepared, usable
 
@@ -32,8 +32,8 @@ SUFFIX = ".nbi"
 ENTRANCE = ".from_python"
 """What follows the name of a kernel in that of its entrance."""
 MOST_ENTRIES = 1500
-_MAGIC = b"surgsim kernel 2\n"
-_DAY_S, _HOUR_S = 86_400.0, 3_600.0
+_MAGIC = b"surgsim kernel 3\n"
+_HOUR_S = 3_600.0
 
 
 class KernelCache(_Cache):
@@ -162,16 +162,21 @@ def _content(data: Any) -> bytes:
     """What is kept of a compiled kernel."""
     library: KernelLibrary = data.library
     needed = [other.entry for other in library.needs]
-    return bytes(dumps((needed, library.symbols, *data._reduce())))
+    return bytes(dumps((needed, library.held, library.symbols, *data._reduce())))
 
 
 def _result(payload: bytes, target_context: Any) -> Any:
-    """The compiled kernel of what was kept; None if one of those whose symbols it holds is not there."""
-    entries, symbols, stored, *rest = pickle.loads(payload)
+    """The compiled kernel of what was kept; None if a symbol that it holds is not there.
+
+    A kernel that it calls may be gone, or have been compiled again by a process that numbers types otherwise.
+    """
+    entries, held, symbols, stored, *rest = pickle.loads(payload)
     needed = [_load(entry, target_context) for entry in entries]
     if any(found is None for found in needed):
         return None
     libraries = [found.library for found in needed]
+    if not held <= defined_by(libraries):
+        return None
     library = KernelLibrary.stored(target_context.codegen(), stored, symbols, libraries)
     return rebuilt(target_context, library, tuple(rest))
 
@@ -180,7 +185,7 @@ def _read(path: Path) -> bytes | None:
     """Content of an entry; None if there is none, or it is not what was written."""
     try:
         content = path.read_bytes()
-        if time.time() - path.stat().st_mtime > _DAY_S:
+        if time.time() - path.stat().st_mtime > _HOUR_S:
             with suppress(OSError):
                 os.utime(path)  # it is in use: it goes last
     except OSError:

@@ -3,11 +3,13 @@
 numba copies the code of every kernel into each of its callers and optimises it again there, so that a kernel
 eight calls deep is optimised eight times. Here a kernel whose code is larger than `LARGEST_INLINED_BYTES`
 stays where it is, and its callers hold its symbol. A symbol is named after the key of the kernel in the
-cache, so that code that different processes compiled fits together, and two functions of one name never
-share a symbol.
+cache, so that two functions of one name never share a symbol, and code that different processes compiled
+mostly fits together. numba also puts numbers into it that it gave to the argument types in that process; so
+what a caller holds is kept with it, and compared when it is loaded: LLVM ends the process for a symbol that
+is not there.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from typing import Any
 from uuid import uuid4
 
@@ -40,6 +42,7 @@ class KernelLibrary(JITCodeLibrary):
         self.entry: str | None = None
         self.needs: list[KernelLibrary] = []
         self._bitcode: bytes | None = None
+        self._symbols: set[str] | None = None
 
     @classmethod
     def stored(
@@ -48,7 +51,7 @@ class KernelLibrary(JITCodeLibrary):
         """The library that `serialize_using_object_code` gave; what it needs has to be loaded before."""
         name, _, (object_code, bitcode) = stored
         library = cls(codegen, name)
-        library.needs, library._bitcode = needs, bitcode
+        library.needs, library._bitcode, library._symbols = needs, bitcode, symbols
         library.enable_object_caching()
         library._set_compiled_object(object_code)
         library._finalize_final_module()
@@ -58,8 +61,19 @@ class KernelLibrary(JITCodeLibrary):
     @property
     def symbols(self) -> set[str]:
         """Names of what its code defines."""
-        parts = (self._final_module.functions, self._final_module.global_variables)
-        return {value.name for part in parts for value in part if not value.is_declaration}
+        if self._symbols is None:
+            self._symbols = {value.name for value in self._values() if not value.is_declaration}
+        return self._symbols
+
+    @property
+    def held(self) -> set[str]:
+        """Those names that its code holds of what the libraries that it needs define."""
+        declared = {value.name for value in self._values() if value.is_declaration}
+        return declared & defined_by(self.needs)
+
+    def _values(self) -> Iterator[Any]:
+        yield from self._final_module.functions
+        yield from self._final_module.global_variables
 
     @property
     def is_large(self) -> bool:
@@ -93,6 +107,11 @@ class KernelLibrary(JITCodeLibrary):
         if self._shared_module is None and self._bitcode is not None:
             self._shared_module = llvm.parse_bitcode(self._bitcode)
         return super()._get_module_for_linking()
+
+
+def defined_by(libraries: Iterable[KernelLibrary]) -> set[str]:
+    """Names of what the code of all these libraries defines."""
+    return {name for library in libraries for name in library.symbols}
 
 
 def _needed(library: Any) -> Iterator[KernelLibrary]:

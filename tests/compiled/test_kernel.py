@@ -202,3 +202,40 @@ def test_clocks_of_a_run_leave_out_what_compiling_took(workshop):
     took = perf_counter() - began
     assert watch.working_time() - wall < 0.5 * took
     assert 1e-9 * (watch.thread_time_ns() - thread) < 0.5 * took
+
+
+RECORDS = """
+import numpy as np
+from surgsim.compiled import compiled
+
+KIND = np.dtype([("a", float), ("b", float)], align=True)
+
+@compiled
+def inner(record):
+    return record.a + 2.0 * record.b
+
+@compiled
+def outer(record):
+    return inner(record) + 1.0
+
+record = np.array([(1.0, 3.0)], dtype=KIND).view(np.recarray)[0]
+"""
+OTHERS = """
+import numpy as np
+from numba import from_dtype, typeof
+kinds = [from_dtype(np.dtype([(name, float)], align=True)) for name in "pqrstuvw"]
+print([kind._code for kind in kinds][:0] or "", end="")
+import user
+print(user.inner(user.record))
+"""
+
+
+def test_a_callee_that_another_process_compiled_again_costs_no_process_its_life(workshop):
+    """The numbers of its types, and so its symbol, are others than those that its caller holds."""
+    workshop.write(user=RECORDS)
+    assert float(workshop.process("import user; print(user.outer(user.record))", 0)) == 8.0
+    (gone,) = [path for path in workshop.entries() if "inner" in path.name]
+    gone.unlink()
+    assert float(workshop.process(OTHERS, 0)) == 7.0
+    assert gone.exists()
+    assert float(workshop.process("import user; print(user.outer(user.record))", 0)) == 8.0
