@@ -56,4 +56,4 @@ def test_drive_constants(arm):
 def test_total_mass(arm):
     total = arm.model.body_mass.sum()
     assert total == pytest.approx(2.3966 + sum(FR3_MASSES), abs=1e-12)
-    assert total == pytest.approx(17.8, rel=0.01)  # the product manual's weight of arm and base
+    assert total == pytest.approx(17.8, rel=0.01)  # the Panda's weight in its product manual
