@@ -10,8 +10,8 @@ from surgsim.models.config import RobotConfig, SceneConfig
 
 H = np.pi / 2
 # The data sheet's lengths in modified DH. Masses and centres of mass: Stuerz, Affolter and Smith, "Parameter
-# identification of the KUKA LBR iiwa robot including constraints on physical feasibility", IFAC 2017, as public
-# programs quote them.
+# identification of the KUKA LBR iiwa robot including constraints on physical feasibility", IFAC 2017, as
+# public programs quote them.
 IDENTIFIED = PublishedArm(
     placements=tuple(
         craig(alpha, 0, d)
