@@ -59,7 +59,7 @@ def test_what_the_readme_says_of_our_controller_holds_in_the_rows():
     assert max(r["rcm_error_max_mm"] for r in ours) <= float(said[2])
 
 
-@pytest.mark.parametrize("file", ["theatre.png", "port_closeup.png", "panda.png"])
+@pytest.mark.parametrize("file", ["theatre.png", "port_closeup.png", "panda.png", "fr3.png", "iiwa14.png"])
 def test_the_pictures_are_those_of_the_current_scenes(made, file):
     draw, _ = made
     assert draw.stamped(draw.HERE / file) == draw.scene_stamp(*draw.SCENES[file]), AGAIN

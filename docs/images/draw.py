@@ -28,6 +28,8 @@ SCENES = {
     "theatre.png": ("circle_lwr4plus", "overview"),
     "port_closeup.png": ("circle_lwr4plus", "port_closeup"),
     "panda.png": ("circle_panda", "overview"),
+    "fr3.png": ("circle_fr3", "overview"),
+    "iiwa14.png": ("circle_iiwa14", "overview"),
 }
 PATHS = ("circle", "sinusoid", "spiral")
 ARMS = {"lwr4plus": BLUE, "panda": VERMILLION}

@@ -16,7 +16,7 @@ from surgsim.scenario.load import shipped, shipped_safety
 NEXT = {
     "": list(COMMANDS),
     "re": ["report", "reproduce"],
-    "run circle_": ["circle_lwr4plus", "circle_panda"],
+    "run circle_": ["circle_fr3", "circle_iiwa14", "circle_lwr4plus", "circle_panda"],
     "run safety/t": ["safety/tip_limit"],
     "run circle_panda --co": ["--controller"],
     "run circle_panda --controller p": ["passive_convex", "pinv", "policy_proportional"],

@@ -14,8 +14,8 @@ from surgsim.models.instrument import rod_masses
 ROBOT = RobotConfig(name="lwr4plus")
 TROCAR = TrocarConfig(position_m=(0.1, 0.5, 0.25), axis=(0.0, -0.3, 1.0))
 Q = np.radians((-35, 10, -55, -95, 5, 60, 20))
-MASS_KG = {"lwr4plus": 16.0, "panda": 16.691901}
-WRIST_TO_FLANGE_M = {"lwr4plus": 0.078, "panda": 0.107}
+MASS_KG = {"fr3": 17.8914010262, "iiwa14": 29.9, "lwr4plus": 16.0, "panda": 16.691901}
+WRIST_TO_FLANGE_M = {"fr3": 0.107, "iiwa14": 0.126, "lwr4plus": 0.078, "panda": 0.107}
 
 
 def _config(**changes: object) -> SceneConfig:
@@ -206,7 +206,7 @@ def test_an_unknown_robot_is_refused():
 
 
 def test_robot_names():
-    assert robot_names() == ["lwr4plus", "panda"]
+    assert robot_names() == ["fr3", "iiwa14", "lwr4plus", "panda"]
     assert not {"instruments", "trocar", "theatre"} & set(robot_names())
 
 

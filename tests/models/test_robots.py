@@ -26,7 +26,8 @@ def _joints(name: str) -> int:
 
 
 def test_the_arms_and_their_joints():
-    assert {name: _joints(name) for name in robot_names()} == {"lwr4plus": 7, "panda": 7}
+    ours = {name: _joints(name) for name in robot_names()}
+    assert ours == {"fr3": 7, "iiwa14": 7, "lwr4plus": 7, "panda": 7}
     tested = {name: _joints(name) for name in arms_for_tests()}
     assert tested == {"test_arm_6": 6, "test_arm_7": 7, "test_arm_8": 8}
 

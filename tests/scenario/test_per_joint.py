@@ -79,5 +79,7 @@ def test_a_scenario_made_in_python_is_refused_too(load):
 
 
 def test_the_arms_for_tests_are_not_listed_and_no_other_name_is_taken(load):
-    with pytest.raises(ScenarioError, match=r"'test_arm_9' is not a robot. Known: lwr4plus, panda\."):
+    with pytest.raises(
+        ScenarioError, match=r"'test_arm_9' is not a robot. Known: fr3, iiwa14, lwr4plus, panda\."
+    ):
         load("test_arm_9")
