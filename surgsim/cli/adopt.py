@@ -18,7 +18,7 @@ circle as a check, and writes a robot's folder. Scenarios then know it by its na
 variable SURGSIM_ROBOTS lists the folder that it is in.
 
 examples:
-  surgsim adopt iiwa14.xml
+  surgsim adopt arm.xml
   surgsim adopt arm.urdf --flange tool0 --name my_arm --out robots
   surgsim adopt cell.xml --set base_body=left_base --set "joints=[l1, l2, l3, l4, l5, l6]"
   surgsim adopt arm.xml --set "limits.torque_nm=[150, 150, 100, 100, 40, 40, 40]" --quick
