@@ -9,6 +9,8 @@ from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
 
+import numpy as np
+
 from surgsim.errors import Outcome
 from surgsim.scenario.thresholds import Threshold, ThresholdsConfig
 from surgsim.tasks import TASKS
@@ -17,6 +19,8 @@ from surgsim.trace.trace import Trace
 
 ALWAYS = ("rcm_error_max_mm", "trocar_force_max_n")
 """Thresholds that hold for every task; a task names those that it needs beside them."""
+AT_LIMIT_RAD = 0.01
+"""A joint nearer to the end of its range than this is said to be at its limit."""
 Metrics = Mapping[str, float | None]
 
 
@@ -80,7 +84,7 @@ class Verdict:
         if self.success and past:
             return f"Done, but {'; '.join(past)} ({self.reason})."
         head = {True: "Done", False: "NOT done", None: "Whether it was done is not defined"}[self.success]
-        texts = [self.reason, *(text for text in past if text != self.reason)]
+        texts = [self.reason, *(text for text in past if not self.reason.startswith(text))]
         if not past and self.thresholds:
             texts.append(_within(self.thresholds))
         return f"{head}: {'; '.join(texts)}."
@@ -112,12 +116,21 @@ def judge(trace: Trace, metrics: Metrics) -> Verdict:
         thresholds = ThresholdsConfig.model_validate_json(json.dumps(scenario.get("thresholds", {})))
         completed = ending.outcome is Outcome.COMPLETED
         found = _success(scenario["task"], trace.active()) if completed else _stopped(ending.outcome)
+        at_limits = _at_limits(trace) if completed else ""
     except Exception as error:  # a task's mistake must not cost a finished run
         reason = f"it could not be judged, {type(error).__name__}: {' '.join(str(error).split())}"
         return Verdict(success=None, reason=reason[:300])
     held = _held(thresholds, metrics, (*found.needs, *ALWAYS))
     success, reason = _with_needs(found, held)
-    return Verdict(success=success, reason=reason, thresholds=held)
+    return Verdict(success=success, reason=reason + at_limits, thresholds=held)
+
+
+def _at_limits(trace: Trace) -> str:
+    """Which joints were at their limit in the run, in words: tip or shaft may have been given up for them."""
+    limits, q = trace.meta.limits, trace.active().block("q")
+    room = np.minimum(q - np.array(limits["q_min"]), np.array(limits["q_max"]) - q).min(axis=0)
+    at = [f"joint {i + 1}" for i in np.flatnonzero(room < AT_LIMIT_RAD)]
+    return f", {' and '.join(at)} at {'its' if len(at) == 1 else 'their'} limit" if at else ""
 
 
 def _stopped(outcome: Outcome) -> Success:

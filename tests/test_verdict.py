@@ -30,7 +30,8 @@ def run(name, columns, *, extra=(), ending=DONE, settings=()):
     for column, value in columns.items():
         data[-1, names.index(column)] = value
     scenario = load_scenario(name, assignments=settings).resolved()
-    limits = dict.fromkeys(("q_min", "q_max", "velocity", "acceleration", "torque"), [1.0] * 7)
+    limits = dict.fromkeys(("q_max", "velocity", "acceleration", "torque"), [1.0] * 7)
+    limits["q_min"] = [-1.0] * 7
     meta = TraceMeta(scenario=scenario, control_period_s=0.001, limits=limits, ending=ending)
     return Trace(data, blocks, meta)
 
@@ -188,7 +189,7 @@ AT_ITS_LIMIT = (
     "task.duration_s=4",
     "task.radius_m=0.05",
     "task.start_m=[0.05, 0.55, 0.02]",
-    "start.posture_rad=[2.044, -0.868, -2.452, -1.823, 1.673, 1.556, 0.57]",
+    "start.q_rad=[1.6029550, -0.5106133, -2.9570597, -1.4358331, -0.3720263, 1.2775577, 0.57]",
 )
 
 
@@ -199,4 +200,18 @@ def test_a_tip_given_up_at_a_joint_limit_completes_and_is_not_done():
     assert metrics["joint_limit_margin_min_rad"] == pytest.approx(0.0, abs=1e-3)
     assert metrics["tip_error_end_mm"] < 0.1, "it comes back to its path"
     found = judge(trace, metrics)
-    assert (found.success, found.reason) == (False, "tip_error_max_mm 5.61 exceeds 3, docs/safety.md")
+    assert not found.success
+    assert found.reason == "tip_error_max_mm 5.61 exceeds 3, docs/safety.md, joint 3 at its limit"
+    assert found.line() == f"NOT done: {found.reason}."
+
+
+def test_joints_at_their_limit_are_named_whether_or_not_the_task_was_done():
+    found = verdict(run("circle_lwr4plus", {"q2_rad": 0.9901}))
+    assert (found.success, found.reason) == (True, "the path was followed, joint 2 at its limit")
+    assert verdict(run("circle_lwr4plus", {"q2_rad": 0.9899})).reason == "the path was followed"
+    both = {"q2_rad": 0.995, "q5_rad": -1.0}
+    found = verdict(run("circle_lwr4plus", both), tip_error_max_mm=5.0, rcm_error_max_mm=9.0)
+    assert found.line() == (
+        "NOT done: tip_error_max_mm 5 exceeds 3, docs/safety.md, joint 2 and joint 5 at their limit; "
+        "rcm_error_max_mm 9 exceeds 5, docs/safety.md."
+    )

@@ -101,8 +101,8 @@ class ArmModel:
         """
         return int(self._model.nv) - 3 - RCM_ROWS * has_trocar - self.rolls_shaft
 
-    def point(self, record: Model, *, shared: bool = False) -> None:
-        """Let a record evaluate this arm, with data of its own or `shared` ones.
+    def point(self, record: Model, *, shared: bool = False) -> mujoco.MjData:
+        """Let a record evaluate this arm, with data of its own or `shared` ones; the data.
 
         This object must outlive the record. Shared data are those of this object's own evaluations.
         """
@@ -118,6 +118,7 @@ class ArmModel:
         )
         record.xaxis, record.xanchor = data.xaxis.ctypes.data, data.xanchor.ctypes.data
         record.damping[:] = self.damping
+        return data
 
     def kinematics(self, q: Array) -> Kinematics:
         """Kinematics at joint positions `q` (n,) [rad]."""

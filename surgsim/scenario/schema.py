@@ -43,7 +43,8 @@ class StartConfig(PartConfig):
 
     Attributes:
         q_rad: Joint positions to start from as they are; null: solve them.
-        posture_rad: Posture near which the solution is sought; null: the robot's own.
+        posture_rad: Posture near which the solution is sought; null: the one with most room to the joint
+            limits.
     """
 
     q_rad: PerJoint | None = None

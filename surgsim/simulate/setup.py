@@ -12,9 +12,11 @@ from surgsim.control.controller import Controller
 from surgsim.errors import SurgsimError, UnreachableError
 from surgsim.models.arm import ArmModel
 from surgsim.models.build import Scene, build
+from surgsim.models.config import TrocarConfig
 from surgsim.plant.base import Plant
 from surgsim.scenario.schema import Scenario
-from surgsim.simulate.start import Reach, check_path, check_through_port, solve_start
+from surgsim.simulate.reach import Reach
+from surgsim.simulate.start import Places, check_path, check_through_port, solve_start
 from surgsim.tasks.base import EnteringTaskConfig, Task, TaskConfig
 
 Array = NDArray[np.float64]
@@ -161,33 +163,50 @@ def _start_of(scenario_json: str) -> Array:
     """Start configuration (n,) [rad], with the path checked; found once for the runs of a batch."""
     scenario = Scenario.model_validate_json(scenario_json)
     arm = ArmModel(scenario.scene)
-    p_WC = None if scenario.trocar is None else np.array(scenario.trocar.position_m)
-    reach = Reach(arm, p_WC)
-    given, p_start = scenario.start.q_rad, _path_start(scenario, arm)
+    trocar, given = scenario.trocar, scenario.start.q_rad
+    p_start = _path_start(scenario, arm)
     try:
-        if scenario.trocar is not None:
-            entering = _enters(scenario.task)
-            check_through_port(p_start, "the start at", scenario.instrument, scenario.trocar, entering)
+        if trocar is not None:
+            _check_port(scenario, trocar, [("the start at", p_start)])
+        places = _build_task(scenario, p_start).reach()
+        if trocar is not None:
+            _check_port(scenario, trocar, places)
+        reach = Reach(arm, scenario.scene)
         if given is None:
-            q = solve_start(reach, arm, p_start, _posture(scenario, arm))
+            q = _solved_start(scenario, arm, np.array([p_start, *(p for _, p in places)]))
         else:
             q = _checked_start(reach, arm, np.array(given), p_start)
-        if scenario.trocar is not None:
-            task = _build_task(scenario, p_start)
-            check_path(reach, task, q, scenario.instrument, scenario.trocar, entering=_enters(scenario.task))
+        if trocar is not None:
+            check_path(reach, places, q)
     except UnreachableError as error:
         raise UnreachableError(f"{scenario.name}: {error}") from error
     q.flags.writeable = False
     return q
 
 
-def _posture(scenario: Scenario, arm: ArmModel) -> Array:
-    if scenario.start.posture_rad is not None:
-        return np.array(scenario.start.posture_rad)
-    key = mujoco.mj_name2id(arm.scene.model, mujoco.mjtObj.mjOBJ_KEY, "home")
-    if key >= 0:
-        return np.array(arm.scene.model.key_qpos[key])
-    return 0.5 * (arm.limits.q_min + arm.limits.q_max)
+def _check_port(scenario: Scenario, trocar: TrocarConfig, places: Places) -> None:
+    """Refuse places that are no pose of the instrument through the port."""
+    for where, p in places:
+        check_through_port(p, where, scenario.instrument, trocar, _enters(scenario.task))
+
+
+def _solved_start(scenario: Scenario, arm: ArmModel, places: Array) -> Array:
+    posture = scenario.start.posture_rad
+    return solve_start(
+        arm,
+        scenario.scene,
+        places,
+        posture=None if posture is None else np.array(posture),
+        home=_home(arm),
+        clear=scenario.safety.stop_at_collision,
+    )
+
+
+def _home(arm: ArmModel) -> Array:
+    """The arm's own posture (n,) [rad]: that of its model, or the middle of its ranges."""
+    model = arm.scene.model
+    key = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_KEY, "home")
+    return np.array(model.key_qpos[key]) if key >= 0 else 0.5 * (arm.limits.q_min + arm.limits.q_max)
 
 
 def _checked_start(reach: Reach, arm: ArmModel, q: Array, p_start: Array) -> Array:

@@ -1,156 +1,114 @@
-"""Start configuration and reach: can the instrument get there through the trocar, and from which joints?
+"""Start configuration: can the instrument follow its path through the trocar, and from which joints?"""
 
-Solved with mink: the tip's position is a task, the shaft through the trocar a hard constraint, joint
-limits are limits, and a weak posture task picks one of the redundant solutions.
-"""
+from collections.abc import Sequence
 
-import mink
 import numpy as np
 from numpy.typing import NDArray
 
-from surgsim.control.mink_tasks import RcmTask
-from surgsim.control.rcm import rcm_kinematics
 from surgsim.errors import UnreachableError
 from surgsim.models.arm import ArmModel
-from surgsim.models.config import InstrumentConfig, TrocarConfig
+from surgsim.models.config import InstrumentConfig, SceneConfig, TrocarConfig
+from surgsim.simulate.reach import LIMIT_MARGIN_RAD, Reach, Start
+from surgsim.simulate.search import roomiest
 from surgsim.spatial import unit
-from surgsim.tasks.base import Task
 
 Array = NDArray[np.float64]
+Places = Sequence[tuple[str, Array]]
 
-TIP_TOLERANCE_M = 1e-6
-RCM_TOLERANCE_M = 1e-6
 MAX_INCLINATION_RAD = np.deg2rad(80.0)
-_LIMIT_MARGIN_RAD = 0.01
+LEAST_ROOM_RAD = 0.1
+"""Room to the joint limits on the whole path with which the start near a posture is taken as it is."""
 
 
-class Reach:
-    """Inverse kinematics of the nominal arm with the shaft in the trocar.
+def solve_start(
+    arm: ArmModel,
+    scene: SceneConfig,
+    places: Array,
+    *,
+    posture: Array | None,
+    home: Array,
+    clear: bool,
+) -> Array:
+    """Start configuration (n,) [rad] of a path: tip at its first place, shaft through the trocar.
+
+    With a posture the solution near it, if its path can be followed at least `LEAST_ROOM_RAD` away from the
+    joint limits; else the one with the most room of all.
 
     Args:
         arm: The nominal arm.
-        p_WC: Trocar position (3,) [m], or None without one.
+        scene: What it is in. Without a port the path after its start is of no account near a posture.
+        places: Places of the tip (k, 3) [m].
+        posture: Joint positions (n,) [rad], or None.
+        home: The arm's own posture (n,) [rad]: of equal solutions the nearest is taken.
+        clear: Whether a start is refused from which arm and patient touch in every solution.
+
+    Raises:
+        UnreachableError: If no solution is inside the joint limits, or none is clear.
     """
-
-    def __init__(self, arm: ArmModel, p_WC: Array | None) -> None:
-        self._arm = arm
-        self._p_WC = p_WC
-        scene = arm.scene
-        self._configuration = mink.Configuration(scene.model)
-        self._tip = mink.FrameTask("tip", "site", position_cost=1.0, orientation_cost=0.0)
-        self._posture = mink.PostureTask(scene.model, cost=1e-4)
-        self._limits = [
-            mink.ConfigurationLimit(scene.model, gain=0.95, min_distance_from_limits=_LIMIT_MARGIN_RAD)
-        ]
-        self._rows: list[RcmTask] = []
-        if p_WC is not None:
-            self._rows.append(RcmTask(scene.tip_site, scene.model.nv))
-            self._rows[0].target = p_WC
-
-    def solve(self, p_WT: Array, q: Array, posture: Array, iterations: int) -> Array:
-        """Joint positions (n,) [rad] near `q` whose tip is at `p_WT` (3,) [m], by repeated mink steps.
-
-        The hard rows are dropped in a step in which they cannot be met inside the joint limits, so the
-        result must be checked with `miss`.
-        """
-        inside = self._arm.limits.q_min + _LIMIT_MARGIN_RAD, self._arm.limits.q_max - _LIMIT_MARGIN_RAD
-        configuration = self._configuration
-        configuration.update(np.clip(q, *inside))
-        self._tip.set_target(mink.SE3.from_translation(p_WT))
-        self._posture.set_target(posture)
-        for count in range(iterations):
-            try:
-                step = self._step(configuration, hard=True)
-            except mink.NoSolutionFound:
-                try:
-                    step = self._step(configuration, hard=False)
-                except mink.NoSolutionFound:  # too far away for the solver: what is there will miss
-                    break
-            length = float(np.linalg.norm(step))
-            configuration.integrate_inplace(step * min(1.0, 0.3 / max(length, 1e-12)), 1.0)
-            if count >= 1 and max(self.miss(configuration.q, p_WT)) < 1e-9:
-                break
-        return np.asarray(np.clip(np.array(configuration.q), *inside))
-
-    def _step(self, configuration: mink.Configuration, *, hard: bool) -> Array:
-        tasks = [self._tip, self._posture] + ([] if hard else self._rows)
-        rows = self._rows if hard and self._rows else None
-        step: Array = mink.solve_ik(
-            configuration, tasks, 1.0, "daqp", damping=1e-9, limits=self._limits, constraints=rows
+    reach = Reach(arm, scene)
+    near = None if posture is None else _near(reach, places, posture)
+    if near is not None and near.room_rad >= LEAST_ROOM_RAD:
+        return near.q
+    best = _best(arm, scene, places, home if posture is None else posture, clear)
+    contact = reach.contact(places, best.q) if clear and best.room_rad > -np.inf else None
+    if near is not None and (near.room_rad >= best.room_rad or contact is not None):
+        return near.q
+    tip, rcm = reach.miss(best.q, places[0])
+    if max(tip, rcm) > 1e-6:
+        raise UnreachableError(
+            f"the start at {_point(places[0])} cannot be reached: the best configuration found leaves the "
+            f"tip {1e3 * tip:.1f} mm and the shaft {1e3 * rcm:.1f} mm away ({reach.near_limit(best.q)})"
         )
-        return step
-
-    def miss(self, q: Array, p_WT: Array) -> tuple[float, float]:
-        """Distance of tip from `p_WT` and of shaft from trocar at `q` [m]."""
-        kin = self._arm.kinematics(q)
-        rcm = 0.0
-        if self._p_WC is not None:
-            rcm = float(np.linalg.norm(rcm_kinematics(kin, self._p_WC, np.zeros(3)).error))
-        return float(np.linalg.norm(kin.p_WT - p_WT)), rcm
-
-    def near_limit(self, q: Array) -> str:
-        """Which joints of `q` are at their position limit, in words."""
-        limits = self._arm.limits
-        margin = np.minimum(q - limits.q_min, limits.q_max - q)
-        at = [f"joint {i + 1}" for i in np.flatnonzero(margin < 2 * _LIMIT_MARGIN_RAD)]
-        return f"{' and '.join(at)} at the position limit" if at else "no joint at its limit, out of reach"
+    if not reach.points_inwards(best.q):
+        raise UnreachableError(
+            f"the start at {_point(places[0])} cannot be reached: the shaft would point out of the patient"
+        )
+    if contact is not None:
+        raise UnreachableError(
+            f"no start is clear of contact on the whole path: with the best found {contact}"
+        )
+    return best.q
 
 
-def solve_start(reach: Reach, arm: ArmModel, p_WT: Array, posture: Array) -> Array:
-    """Start configuration (n,) [rad]: tip at `p_WT`, shaft through the trocar, near `posture`.
+def _near(reach: Reach, places: Array, posture: Array) -> Start | None:
+    """The solution near the posture; None if there is none, or its path cannot be followed."""
+    from surgsim.simulate.posture import near_posture  # mink takes 0.3 s to import
 
-    Tries the posture and then turned copies of it.
+    q = near_posture(reach, places[0], posture)
+    if q is None or reach.p_WC is None:
+        return None if q is None else Start(q=q, worth=np.inf, room_rad=np.inf)
+    start = reach.start(reach.path(places, clear=False), q)
+    return start if start.room_rad > -np.inf and reach.points_inwards(q) else None
+
+
+def _best(arm: ArmModel, scene: SceneConfig, places: Array, guess: Array, clear: bool) -> Start:
+    """The solution with the most room.
+
+    Joints are free in the first search: it comes to all solutions, also by way of some past a limit. Where
+    none of them leaves room, a second one keeps all joints inside, and a path may go along a limit.
+    """
+    best = roomiest(Reach(arm, scene, inside=False), places, guess, clear=clear)
+    if best.room_rad >= LIMIT_MARGIN_RAD:
+        return best
+    return roomiest(Reach(arm, scene), places, guess, clear=clear)
+
+
+def check_path(reach: Reach, places: Places, q_start: Array) -> None:
+    """Refuse a path that the instrument cannot follow through the trocar from `q_start` (n,) [rad].
 
     Raises:
-        UnreachableError: If none leads to a solution inside the joint limits.
+        UnreachableError: With the place and the reason.
     """
-    best, best_miss = posture, np.inf
-    for turn in (0.0, 0.5, -0.5, 1.0, -1.0, 1.5, -1.5):
-        guess = posture.copy()
-        guess[0] += turn
-        q = reach.solve(p_WT, guess, posture, 200)
-        tip, rcm = reach.miss(q, p_WT)
-        if TIP_TOLERANCE_M <= tip < 1e-4:  # the posture's pull is left
-            q = reach.solve(p_WT, q, q, 50)
-            tip, rcm = reach.miss(q, p_WT)
-        if tip < TIP_TOLERANCE_M and rcm < RCM_TOLERANCE_M:
-            return q
-        if tip + rcm < best_miss:
-            best, best_miss = q, tip + rcm
-    tip, rcm = reach.miss(best, p_WT)
+    points = np.array([p for _, p in places])
+    followed = reach.follow(reach.path(points, clear=False), q_start)
+    if followed.reached == len(places):
+        return
+    where, p = places[followed.reached]
+    tip, rcm = reach.miss(followed.q, p)
     raise UnreachableError(
-        f"the start at {_point(p_WT)} cannot be reached: the best configuration found leaves the tip "
-        f"{1e3 * tip:.1f} mm and the shaft {1e3 * rcm:.1f} mm away ({reach.near_limit(best)})"
+        f"{where} {_point(p)} cannot be reached: the tip stays {1e3 * tip:.1f} mm "
+        f"and the shaft {1e3 * rcm:.1f} mm away ({reach.near_limit(followed.q)})"
     )
-
-
-def check_path(
-    reach: Reach,
-    task: Task,
-    q_start: Array,
-    instrument: InstrumentConfig | None,
-    trocar: TrocarConfig | None,
-    *,
-    entering: bool = False,
-) -> None:
-    """Refuse a path that the instrument cannot follow through the trocar.
-
-    `entering` allows the tip to be on the port's axis outside the patient.
-
-    Raises:
-        UnreachableError: With the time, the place and the reason.
-    """
-    q = q_start
-    for where, p in task.reach():
-        if trocar is not None:
-            check_through_port(p, where, instrument, trocar, entering)
-        q = reach.solve(p, q, q, 10)
-        tip, rcm = reach.miss(q, p)
-        if tip > 1e-4 or rcm > 1e-4:
-            raise UnreachableError(
-                f"{where} {_point(p)} cannot be reached: the tip stays {1e3 * tip:.1f} mm "
-                f"and the shaft {1e3 * rcm:.1f} mm away ({reach.near_limit(q)})"
-            )
 
 
 def check_through_port(

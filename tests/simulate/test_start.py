@@ -1,18 +1,22 @@
 """The start is solved through the trocar; what is out of reach is refused with the reason."""
 
 import re
+import subprocess
+import sys
 
 import numpy as np
 import pytest
 
 from surgsim.control.rcm import rcm_kinematics
 from surgsim.errors import SurgsimError, UnreachableError
-from surgsim.models.config import InstrumentConfig, TrocarConfig
+from surgsim.models.arm import ArmModel
+from surgsim.models.config import InstrumentConfig, RobotConfig, SceneConfig, TrocarConfig
 from surgsim.plant.disturbances import DISTURBANCES
 from surgsim.scenario.load import load_scenario, shipped
+from surgsim.simulate.posture import near_posture
+from surgsim.simulate.reach import Reach
 from surgsim.simulate.setup import prepare
-from surgsim.simulate.start import Reach, check_path, solve_start
-from surgsim.tasks.circle import CircleConfig
+from surgsim.simulate.start import check_through_port, solve_start
 
 GIVEN = "start.q_rad=[1.5708, 0.5236, 0.0, -1.5708, 0.0, 1.0472, 0.0]"
 
@@ -31,21 +35,89 @@ def test_every_shipped_scenario_starts_on_its_path_with_the_shaft_through_the_tr
     _assert_starts_well(prepare(load_scenario(name, assignments=["theatre=false"])))
 
 
+def _solved(arm, scene, *places, posture=None, clear=True):
+    middle = 0.5 * (arm.limits.q_min + arm.limits.q_max)
+    return solve_start(arm, scene, np.array(places), posture=posture, home=middle, clear=clear)
+
+
 @pytest.mark.parametrize("seed", range(3))
-def test_starts_all_over_the_workspace_are_solved(arm, seed):
+def test_starts_all_over_the_workspace_are_solved_near_the_posture(arm, seed):
     rng = np.random.default_rng(seed)
-    p_WC = np.array([0.0, 0.55, 0.2])
-    p_WT = p_WC + rng.uniform([-0.06, -0.06, -0.2], [0.06, 0.06, -0.1])
+    p_WC = (0.0, 0.55, 0.2)
+    scene = SceneConfig(robot=RobotConfig(name="lwr4plus"), trocar=TrocarConfig(position_m=p_WC))
+    p_WT = np.array(p_WC) + rng.uniform([-0.06, -0.06, -0.2], [0.06, 0.06, -0.1])
     posture = np.array([1.5708, 0.5236, 0.0, -1.5708, 0.0, 1.0472, 0.0])
-    reach = Reach(arm, p_WC)
-    tip, rcm = reach.miss(solve_start(reach, arm, p_WT, posture), p_WT)
-    assert max(tip, rcm) < 1e-6
+    q = _solved(arm, scene, p_WT, posture=posture)
+    assert max(Reach(arm, scene).miss(q, p_WT)) < 1e-6
 
 
-def test_without_a_trocar_the_tip_alone_is_placed(arm):
-    reach = Reach(arm, None)
-    q = solve_start(reach, arm, np.array([0.3, 0.4, 0.3]), np.full(7, 0.3))
+@pytest.mark.parametrize("posture", [None, np.full(7, 0.3)])
+def test_without_a_trocar_the_tip_alone_is_placed(arm, posture):
+    scene = SceneConfig(robot=RobotConfig(name="lwr4plus"))
+    q = _solved(arm, scene, np.array([0.3, 0.4, 0.3]), posture=posture)
     np.testing.assert_allclose(arm.kinematics(q).p_WT, [0.3, 0.4, 0.3], atol=1e-6)
+
+
+NEAR_A_LIMIT = (
+    "task.radius_m=0.05",
+    "task.duration_s=4",
+    "task.ramp_s=1",
+    "task.start_m=[0.05, 0.55, 0.02]",
+    "start.posture_rad=[2.044, -0.868, -2.452, -1.823, 1.673, 1.556, 0.57]",
+)
+
+
+def _room(setup):
+    """Smallest distance to a joint limit on the path, which is followed with the pseudo-inverse [rad]."""
+    arm, q = setup.arm, setup.q_start
+    p_WC = np.array(setup.scenario.trocar.position_m)
+    room = np.inf
+    for _, p in setup.task.reach():
+        for _ in range(5):
+            kin = arm.kinematics(q)
+            rcm = rcm_kinematics(kin, p_WC, np.zeros(3))
+            miss = np.concatenate([kin.p_WT - p, rcm.error])
+            q = q - np.linalg.pinv(np.vstack([kin.Jv_WT, rcm.jacobian]), rcond=1e-6) @ miss
+        room = min(room, np.minimum(q - arm.limits.q_min, arm.limits.q_max - q).min())
+    return room
+
+
+def test_a_start_near_its_posture_whose_path_comes_to_a_limit_gives_way_to_the_roomiest(scenario):
+    near = near_posture_start(scenario(*NEAR_A_LIMIT))
+    given = prepare(scenario(*NEAR_A_LIMIT, f"start={{q_rad: {near.tolist()}}}"))
+    assert _room(given) < 0.01, "joint 3 is at its limit on the path"
+    assert _room(prepare(scenario(*NEAR_A_LIMIT))) > 0.34
+
+
+def test_a_start_with_room_near_its_posture_is_taken_as_it_is(scenario):
+    near = scenario("task.radius_m=0.05", "task.start_m=[0.05, 0.55, 0.02]", "task.duration_s=4")
+    np.testing.assert_array_equal(prepare(near).q_start, near_posture_start(near))
+
+
+def near_posture_start(scenario):
+    """The start that the posture alone gives."""
+    reach = Reach(ArmModel(scenario.scene), scenario.scene)
+    return near_posture(reach, np.array(scenario.task.start_m), np.array(scenario.start.posture_rad))
+
+
+@pytest.mark.parametrize("name", ["circle_lwr4plus", "circle_panda", "spiral_lwr4plus", "insertion_lwr4plus"])
+def test_without_a_posture_the_start_has_at_least_the_room_of_the_shipped_one(name):
+    shipped_one = prepare(load_scenario(name, assignments=["theatre=false"]))
+    searched = prepare(load_scenario(name, assignments=["theatre=false", "start={}"]))
+    _assert_starts_well(searched)
+    assert _room(searched) > _room(shipped_one) - 0.01
+
+
+def test_mink_is_not_imported_where_no_posture_is_asked_for():
+    code = """
+import sys
+from surgsim.scenario.load import load_scenario
+from surgsim.simulate.setup import prepare
+prepare(load_scenario("circle_lwr4plus", assignments=["theatre=false", "start={}"]))
+print("mink" in sys.modules)
+"""
+    found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert found.stdout.strip() == "False"
 
 
 def test_a_start_given_in_joints_is_taken_as_it_is_and_begins_the_path(scenario):
@@ -101,7 +173,7 @@ REFUSED = {
         r"configuration found leaves the tip \d+\.\d mm and the shaft \d+\.\d mm away \(joint \d.* limit\)",
     ),
     "path out of joint range": (
-        ["task.radius_m=0.2"],
+        ["task.radius_m=0.1", "task.direction=[0, -1, 0]"],
         r"/circle_lwr4plus: at t = \d\.\d\d s the path point \(.*\) m cannot be reached: "
         r"the tip stays \d+\.\d mm and the shaft \d+\.\d mm away \(joint \d.* at the position limit\)",
     ),
@@ -126,16 +198,6 @@ def test_out_of_reach_is_refused_with_the_reason(scenario, name):
     assert re.fullmatch(pattern, str(caught.value)), str(caught.value)
 
 
-class Anywhere:
-    """An arm that reaches every point."""
-
-    def solve(self, p_WT, q, posture, iterations):
-        return q
-
-    def miss(self, q, p_WT):
-        return 0.0, 0.0
-
-
 @pytest.mark.parametrize(
     ("tip", "reason"),
     [
@@ -146,16 +208,14 @@ class Anywhere:
     ],
 )
 def test_points_that_are_no_pose_through_the_port_are_refused_whatever_the_arm(tip, reason):
-    task = CircleConfig(radius_m=1e-9).build(np.array(tip))
     trocar = TrocarConfig(position_m=(0.0, 0.3, 0.2))
     with pytest.raises(UnreachableError, match=re.escape(f"m cannot be reached: {reason}")):
-        check_path(Anywhere(), task, np.zeros(7), InstrumentConfig(), trocar)
+        check_through_port(np.array(tip), "the start at", InstrumentConfig(), trocar)
 
 
-def test_a_path_below_the_port_is_accepted():
-    task = CircleConfig().build(np.array([0.0, 0.3, 0.0]))
+def test_a_point_below_the_port_is_accepted():
     trocar = TrocarConfig(position_m=(0.0, 0.3, 0.2))
-    check_path(Anywhere(), task, np.zeros(7), InstrumentConfig(), trocar)
+    check_through_port(np.array([0.0, 0.3, 0.0]), "the start at", InstrumentConfig(), trocar)
 
 
 def test_a_start_above_the_port_is_refused_because_of_that(scenario):

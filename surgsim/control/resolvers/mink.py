@@ -3,7 +3,6 @@
 from collections.abc import Callable, Mapping
 from typing import ClassVar, Literal
 
-import mink
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import NonNegativeFloat, PositiveFloat
@@ -11,7 +10,6 @@ from pydantic import NonNegativeFloat, PositiveFloat
 from surgsim.catalog import PartConfig
 from surgsim.compiled import compiled
 from surgsim.control.inside import Head
-from surgsim.control.mink_tasks import LimitRows, RcmTask
 from surgsim.control.resolvers.base import KernelResolver
 from surgsim.control.resolvers.rows import answer, fill_task_rows
 from surgsim.models.arm import ArmModel
@@ -96,6 +94,10 @@ class MinkSolver:
     """
 
     def __init__(self, config: MinkConfig, arm: ArmModel) -> None:
+        import mink  # takes 0.3 s, which scenarios without it need not wait for
+
+        from surgsim.control.mink_tasks import RcmTask
+
         self._c, model = config, arm.scene.model
         self._configuration = mink.Configuration(model)
         self._tip = mink.FrameTask("tip", "site", position_cost=config.tip_cost, orientation_cost=0.0)
@@ -111,6 +113,10 @@ class MinkSolver:
 
     def join(self, seen: Fields, memory: Array) -> Callable[[], int]:
         """What the kernel enters to have mink's answer to the target and the RCM's shift in its memory."""
+        import mink
+
+        from surgsim.control.mink_tasks import LimitRows
+
         dt, normals, p_WC = seen["dt_s"].item(), seen["normals"].T, seen["p_WC"]
         target, shift, answer = memory[_TARGET:_SHIFT], memory[_SHIFT:_QDOT], memory[_QDOT:]
         rows = [self._rcm] if seen["has_trocar"][0] else None

@@ -6,8 +6,9 @@ from pydantic import ValidationError
 
 from surgsim.models.peg_board import PegBoardLayout, grasp_side, transfer_goals
 from surgsim.scenario.load import load_scenario
+from surgsim.simulate.reach import Reach
 from surgsim.simulate.setup import prepare
-from surgsim.simulate.start import Reach, check_through_port
+from surgsim.simulate.start import check_through_port
 
 STEPS = ["hover_source", "approach", "grasp", "lift", "hover_target", "place", "release", "leave"]
 
@@ -60,13 +61,13 @@ def test_the_goals_move_and_turn_with_the_board():
 def test_the_shaft_reaches_every_goal_through_the_port(scenario, board):
     scenario = load_scenario(scenario)
     setup = prepare(scenario)
-    reach = Reach(setup.arm, np.array(scenario.trocar.position_m))
+    reach = Reach(setup.arm, scenario.scene)
     q = setup.q_start
     for goal in transfer_goals(PegBoardLayout(position_m=board)):
         check_through_port(goal.position, goal.name, scenario.instrument, scenario.trocar)
         for share in np.linspace(0.25, 1.0, 4):
             here = setup.arm.kinematics(q).p_WT
-            q = reach.solve(here + share * (goal.position - here), q, q, 20)
+            q = reach.settle(here + share * (goal.position - here), q)
         assert max(reach.miss(q, goal.position)) < 1e-6, goal.name
         room = np.minimum(q - setup.arm.limits.q_min, setup.arm.limits.q_max - q)
         assert room.min() > 0.3, goal.name
