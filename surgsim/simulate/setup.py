@@ -4,7 +4,6 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import TypeGuard
 
-import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
@@ -204,9 +203,8 @@ def _solved_start(scenario: Scenario, arm: ArmModel, places: Array) -> Array:
 
 def _home(arm: ArmModel) -> Array:
     """The arm's own posture (n,) [rad]: that of its model, or the middle of its ranges."""
-    model = arm.scene.model
-    key = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_KEY, "home")
-    return np.array(model.key_qpos[key]) if key >= 0 else 0.5 * (arm.limits.q_min + arm.limits.q_max)
+    home = arm.scene.home
+    return 0.5 * (arm.limits.q_min + arm.limits.q_max) if home is None else home
 
 
 def _checked_start(reach: Reach, arm: ArmModel, q: Array, p_start: Array) -> Array:
