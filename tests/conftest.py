@@ -57,6 +57,12 @@ def scenario() -> Callable[..., Scenario]:
     return make
 
 
+@pytest.fixture
+def without_scenes(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Reports that are written meanwhile show no scenes, as where the scenarios are not at hand."""
+    monkeypatch.setattr("surgsim.report.scenes.look", lambda scenarios: ())
+
+
 class _Asked:
     """A resolver in Python that is asked first, and then does what the resolver in its place did."""
 

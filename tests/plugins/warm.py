@@ -102,7 +102,11 @@ class Warm:
         self, words: Sequence[str], folder: Path, timeout_s: float = 100.0, **variables: str
     ) -> subprocess.CompletedProcess[str]:
         """`surgsim` with `words`, when it has ended; `variables` are added to its environment."""
-        with open(os.devnull) as nothing, tempfile.TemporaryFile() as out, tempfile.TemporaryFile() as error:
+        with (
+            open(os.devnull, encoding="utf-8") as nothing,
+            tempfile.TemporaryFile() as out,
+            tempfile.TemporaryFile() as error,
+        ):
             streams = [stream.fileno() for stream in (nothing, out, error)]
             command = self.start(words, streams, folder, {**os.environ, **variables})
             command.wait(timeout_s)
