@@ -7,6 +7,7 @@ does, rather than of how it starts, asks for the fixture `warm`.
 import json
 import os
 import select
+import signal
 import socket
 import subprocess
 import sys
@@ -28,7 +29,9 @@ class WarmCommand:
     def __init__(self, status: int) -> None:
         """The command whose number, and later its exit status, come through the pipe `status`."""
         self._status = open(status, encoding="ascii")  # noqa: SIM115
-        self.pid = int(self._status.readline())
+        number = self._status.readline()
+        assert number, "the warm process has ended: its errors are above"
+        self.pid = int(number)
         self.returncode: int | None = None
 
     def poll(self) -> int | None:
@@ -109,7 +112,12 @@ class Warm:
         ):
             streams = [stream.fileno() for stream in (nothing, out, error)]
             command = self.start(words, streams, folder, {**os.environ, **variables})
-            command.wait(timeout_s)
+            try:
+                command.wait(timeout_s)
+            except subprocess.TimeoutExpired:
+                os.kill(command.pid, signal.SIGKILL)
+                command.wait()
+                raise
             texts = []
             for stream in (out, error):
                 stream.seek(0)
