@@ -6,6 +6,9 @@ PY := $(VENV)/bin/python
 PYTHON ?= $(shell command -v python3.11 || command -v python3)
 EXTRAS := dev,gymnasium,pandas,ray,bench
 RUN := runs/circle_lwr4plus/vprnn-seed0
+# Each process of the tests begins at its own half and takes from the other's end when it is through: so tests of one
+# file, which share what they make first, and the kernels that they compile, stay together.
+TWO_AT_ONCE := -n 2 --dist worksteal
 
 # What is installed follows from these; a stamp named after them says that pip has nothing to do.
 STATE := $(shell { echo '$(ROOT)'; cat '$(ROOT)/pyproject.toml' '$(ROOT)/constraints.txt'; } | cksum | tr ' ' '-')
@@ -38,10 +41,10 @@ run: $(INSTALLED)  ## run the circle scenario, then inspect its recording
 	@echo && echo 'written to $(ROOT)/$(RUN):' && ls -l '$(ROOT)/$(RUN)'
 
 test: $(INSTALLED_DEV)  ## run the tests, slow ones left out; PYTEST_ARGS=... are given to pytest
-	@cd '$(ROOT)' && "$(PY)" -m pytest -n 2 -m "not slow" $(PYTEST_ARGS)
+	@cd '$(ROOT)' && "$(PY)" -m pytest $(TWO_AT_ONCE) -m "not slow" $(PYTEST_ARGS)
 
 test-all: $(INSTALLED_DEV)  ## run all tests
-	@cd '$(ROOT)' && "$(PY)" -m pytest -n 2 $(PYTEST_ARGS)
+	@cd '$(ROOT)' && "$(PY)" -m pytest $(TWO_AT_ONCE) $(PYTEST_ARGS)
 
 check: $(INSTALLED_DEV)  ## formatting, lint and types, as CI
 	@cd '$(ROOT)' && "$(PY)" -m ruff format --check .

@@ -18,7 +18,7 @@ from surgsim.scenario.schema import Scenario
 from surgsim.simulate.setup import Setup
 from surgsim.trace.trace import Ending, Trace, TraceMeta, base_blocks
 
-pytest_plugins = ["left_out"]
+pytest_plugins = ["left_out", "warm"]
 
 
 @pytest.fixture(scope="session")
@@ -55,6 +55,12 @@ def scenario() -> Callable[..., Scenario]:
         )
 
     return make
+
+
+@pytest.fixture
+def without_scenes(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Reports that are written meanwhile show no scenes, as where the scenarios are not at hand."""
+    monkeypatch.setattr("surgsim.report.scenes.look", lambda scenarios: ())
 
 
 class _Asked:

@@ -79,7 +79,8 @@ def examples() -> list[doctest.DocTest]:
     objects = [getattr(surgsim, name) for name in surgsim.__all__ if name != "compare"]
     objects += [comparing.compare, metrics.Metrics, leaderboard.Leaderboard, plain.assignments_of]
     found = [test for item in objects for test in finder.find(item, module=False)]
-    return [*found, *finder.find(surgsim, module=False, globs={})]
+    of_package = doctest.DocTestFinder(recurse=False).find(surgsim, module=False, globs={})
+    return [*found, *of_package]
 
 
 EXAMPLES = {test.name: test for test in examples() if test.examples}

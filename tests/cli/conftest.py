@@ -12,6 +12,7 @@ import sys
 import termios
 import time
 from dataclasses import dataclass, field
+from typing import Any
 
 import pytest
 
@@ -29,12 +30,12 @@ class Typed:
     """A command that runs, or has run, in a terminal.
 
     Attributes:
-        process: It.
+        process: It, a `subprocess.Popen` or as much of one as we use.
         screen: Our end of its terminal.
         output: What it has written so far, with every escape sequence.
     """
 
-    process: subprocess.Popen
+    process: Any
     screen: int
     output: bytearray = field(default_factory=bytearray)
 
@@ -74,25 +75,30 @@ class Typed:
         return [line.rstrip() for line in re.split(r"[\n\r]+", self.text) if line.strip()]
 
 
+def _cold(words, terminal, folder, environment):
+    """A process that starts in a terminal."""
+    return subprocess.Popen(
+        [sys.executable, "-c", _TAKE_TERMINAL, *words],
+        cwd=folder,
+        env=environment,
+        stdin=terminal,
+        stdout=terminal,
+        stderr=terminal,
+        start_new_session=True,
+    )
+
+
 @pytest.fixture
-def terminal(tmp_path):
-    """Starts a command in a terminal of some columns, in a folder."""
+def typing(tmp_path):
+    """Opens a terminal of some columns, and has a process begun in it, in a folder."""
     started = []
 
-    def start(*words, columns=80, cwd=tmp_path, env=None):
+    def start(begin, words, columns=80, cwd=tmp_path, env=None):
         ours, theirs = pty.openpty()
         fcntl.ioctl(theirs, termios.TIOCSWINSZ, struct.pack("HHHH", 50, columns, 0, 0))
         unwanted = ("COLUMNS", "LINES", "NO_COLOR", "FORCE_COLOR")
         environment = {key: value for key, value in os.environ.items() if key not in unwanted}
-        process = subprocess.Popen(
-            [sys.executable, "-c", _TAKE_TERMINAL, *words],
-            cwd=cwd,
-            env={**environment, "TERM": "xterm-256color", **(env or {})},
-            stdin=theirs,
-            stdout=theirs,
-            stderr=theirs,
-            start_new_session=True,
-        )
+        process = begin(words, theirs, cwd, {**environment, "TERM": "xterm-256color", **(env or {})})
         os.close(theirs)
         started.append(Typed(process, ours))
         return started[-1]
@@ -106,10 +112,26 @@ def terminal(tmp_path):
 
 
 @pytest.fixture
-def surgsim(terminal):
-    """Starts `surgsim` in a terminal."""
+def terminal(typing):
+    """Starts a command in a terminal."""
 
     def start(*words, **options):
-        return terminal(sys.executable, "-W", "error", "-m", "surgsim", *words, **options)
+        return typing(_cold, words, **options)
+
+    return start
+
+
+@pytest.fixture
+def surgsim(terminal, typing, warm):
+    """Starts `surgsim` in a terminal: as a fork of a warm process, or `cold`, as a person does."""
+
+    def start(*words, cold=False, strict=True, **options):
+        def begin(words, screen, folder, environment):
+            return warm.start(words, [screen] * 3, folder, environment, terminal=True, strict=strict)
+
+        if cold:
+            errors = ("-W", "error") if strict else ()
+            return terminal(sys.executable, *errors, "-m", "surgsim", *words, **options)
+        return typing(begin, words, **options)
 
     return start

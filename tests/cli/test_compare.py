@@ -78,6 +78,7 @@ def test_progress_and_what_was_written_are_on_stderr(done):
     ]
 
 
+@pytest.mark.usefixtures("without_scenes")
 def test_results_that_are_there_are_kept_unless_resumed(surgsim, done, folder, capsys, monkeypatch):
     monkeypatch.chdir(folder)
     assert main(["compare", "tiny.yaml"]) == 2
@@ -93,6 +94,7 @@ def test_results_that_are_there_are_kept_unless_resumed(surgsim, done, folder, c
     assert {row["controller"] for row in rows} == {"pinv", "vprnn"}
 
 
+@pytest.mark.usefixtures("without_scenes")
 def test_shards_from_the_command_line(capsys, monkeypatch, folder, done):
     monkeypatch.chdir(folder)
     words = ["compare", "tiny.yaml", "--out", "shards", "--jobs", "1"]
@@ -151,6 +153,7 @@ def test_what_is_wrong_is_said_before_anything_is_run(capsys, monkeypatch, tmp_p
     assert [path.name for path in tmp_path.iterdir()] == ["other.txt"]
 
 
+@pytest.mark.usefixtures("without_scenes")
 def test_a_batch_with_crashed_runs_is_no_success(capsys, monkeypatch, tmp_path):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "tiny.yaml").write_text(SUITE)

@@ -98,9 +98,7 @@ def test_one_compiled_kernel_serves_literals_numbers_fields_and_arrays(workshop)
     assert sorted(workshop.compiled) == ["both", "scale"]
 
 
-BRANCHES = "\n".join(
-    f"    if x > {k}: s += np.sin(s + {k}.0) * np.cos(x) / (1.0 + s * s)" for k in range(200)
-)
+BRANCHES = "\n".join(f"    if x > {k}: s += np.sin(s + {k}.0) * np.cos(x) / (1.0 + s * s)" for k in range(50))
 LARGE = f"""
 import numpy as np
 from surgsim.compiled import compiled

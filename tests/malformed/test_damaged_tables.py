@@ -226,6 +226,7 @@ METRICS_JSON: dict[str, Callable[[Path], None]] = {
 }
 
 
+@pytest.mark.usefixtures("without_scenes")
 @pytest.mark.parametrize("name", METRICS_JSON)
 def test_a_damaged_run_is_not_counted_but_done_again(name: str, batch, whole, monkeypatch) -> None:
     """Resuming is the cure: the run is found not to be whole, and only it is run."""
