@@ -56,10 +56,13 @@ class Within(_Form):
         return super().get_call_template([_plain(kind) for kind in args], plain)
 
     def for_signature(self, signature: Any) -> _Form:
-        """The kernel compiled for `signature`: this one, if that is what it returns anyhow."""
+        """The kernel compiled for `signature`: this one, if that is what it returns anyhow.
+
+        One that always returns the same number has that number's own type, and the same machine code.
+        """
         self.compile(signature.args)
         found: Any = self.overloads[signature.args]
-        same = found.signature.return_type == signature.return_type
+        same = _plain(found.signature.return_type) == signature.return_type
         return self if same else super().for_signature(signature)
 
     def _again(self) -> "Within":
