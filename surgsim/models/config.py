@@ -110,6 +110,8 @@ class RobotConfig(PartConfig):
             or body `flange`, `attachment_site` or `tool0`.
         home_rad: A posture to prefer [rad]; null: the file's keyframe `home`.
         limits: Limits that the file lacks, or that count before its own.
+        armature_kg_m2: Inertia of each motor as its joint feels it [kg m^2]; null: the file's. Files often
+            have none, and joints of the wrist are then lighter than any real one.
         collision: `auto` fits capsules to the file's shapes; or a list of capsules.
         files_sha256: Hash of the file and all that it names, of a robot's folder that is not shipped too;
             filled in, and checked where it is given.
@@ -127,6 +129,7 @@ class RobotConfig(PartConfig):
     flange: FlangeConfig | str | None = None
     home_rad: tuple[FiniteFloat, ...] | None = None
     limits: LimitsConfig = LimitsConfig()
+    armature_kg_m2: tuple[NonNegativeFloat, ...] | None = None
     collision: Literal["auto"] | tuple[CapsuleConfig, ...] = "auto"
     files_sha256: str | None = None
     base_position_m: Vec3 = (0.0, 0.0, 0.0)
@@ -208,6 +211,7 @@ OF_FILES = (
     "flange",
     "home_rad",
     "limits",
+    "armature_kg_m2",
     "collision",
     *HASH,
 )

@@ -100,8 +100,11 @@ def _left_out(found: Findings, joined: list[tuple[str, str]]) -> Iterator[str]:
 
 def _lacking(found: Findings) -> Iterator[str]:
     model, dofs = found.model, [int(found.model.jnt_dofadr[j]) for j in found.chain.joints]
-    if not np.any(model.dof_armature[dofs]):
-        yield "reflected inertia of the motors (armature)"
+    if not np.any(found.armature):
+        yield (
+            "inertia of the motors (armature_kg_m2): the wrist is lighter than a real one, and laws that "
+            "damp each joint can be too stiff for it"
+        )
     if not np.any(model.dof_damping[dofs]) and not np.any(model.dof_frictionloss[dofs]):
         yield "damping and friction of the joints"
     shaped = set(model.geom_bodyid.tolist())

@@ -5,11 +5,14 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import mujoco
+import numpy as np
 
 from surgsim.models.adopted.chain import Chain, find_chain
 from surgsim.models.adopted.file import ModelFile, read_file
 from surgsim.models.adopted.limits import Limits, find_limits
 from surgsim.models.adopted.links import Link, Links, rigid_links
+from surgsim.models.adopted.problem import AdoptionError
+from surgsim.spatial import Array
 
 if TYPE_CHECKING:
     from surgsim.models.config import RobotConfig
@@ -24,12 +27,14 @@ class Findings:
         chain: Where the arm is in it.
         limits: What the joints can do.
         links: What moves as one.
+        armature: Inertia of each motor as its joint feels it (n,) [kg m²].
     """
 
     file: ModelFile
     chain: Chain
     limits: Limits
     links: Links
+    armature: Array
 
     @property
     def model(self) -> mujoco.MjModel:
@@ -62,4 +67,21 @@ def read_arm(robot: "RobotConfig") -> Findings:
     file = read_file(*robot.file)
     chain = find_chain(file.model, robot)
     limits = find_limits(file, chain, robot)
-    return Findings(file=file, chain=chain, limits=limits, links=rigid_links(file.model, chain))
+    return Findings(
+        file=file,
+        chain=chain,
+        limits=limits,
+        links=rigid_links(file.model, chain),
+        armature=_armature(file.model, chain, robot.armature_kg_m2),
+    )
+
+
+def _armature(model: mujoco.MjModel, chain: Chain, given: tuple[float, ...] | None) -> Array:
+    """What the scenario gives, else what the file has."""
+    dofs = [int(model.jnt_dofadr[j]) for j in chain.joints]
+    if given is None:
+        return np.array(model.dof_armature[dofs], dtype=float)
+    if len(given) != len(dofs):
+        reason = f"armature_kg_m2 has {len(given)} numbers; the arm has {len(dofs)} joints"
+        raise AdoptionError(reason, "armature_kg_m2")
+    return np.array(given, dtype=float)

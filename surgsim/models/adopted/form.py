@@ -30,7 +30,7 @@ def mechanics_of(found: Findings, home: Array | None) -> mujoco.MjSpec:
             body.quat = _quaternion(above.R_WL.T @ link.R_WL)
         _set_inertia(body, link)
         if i > 0:
-            _add_joint(body, model, found.chain.joints[i - 1], f"joint{i}", limits.position[i - 1])
+            _add_joint(body, found, i - 1)
         above = link
     p, R = flange_in_last_link(found)
     body.add_site(name="flange", pos=p, quat=_quaternion(R), group=4)
@@ -56,17 +56,18 @@ def _set_inertia(body: mujoco.MjsBody, link: Link) -> None:
         body.fullinertia = [link.inertia[i] for i in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))]
 
 
-def _add_joint(body: mujoco.MjsBody, model: mujoco.MjModel, joint: int, name: str, limits: Array) -> None:
+def _add_joint(body: mujoco.MjsBody, found: Findings, i: int) -> None:
+    model, joint = found.model, found.chain.joints[i]
     dof, zero = int(model.jnt_dofadr[joint]), float(model.qpos0[model.jnt_qposadr[joint]])
     body.add_joint(
-        name=name,
+        name=f"joint{i + 1}",
         type=mujoco.mjtJoint.mjJNT_HINGE,
         axis=model.jnt_axis[joint],
         pos=model.jnt_pos[joint],
-        range=limits,
+        range=found.limits.position[i],
         limited=True,
         ref=zero,
-        armature=float(model.dof_armature[dof]),
+        armature=float(found.armature[i]),
         damping=float(model.dof_damping[dof]),
         frictionloss=float(model.dof_frictionloss[dof]),
     )

@@ -99,6 +99,9 @@ def test_limits_come_from_servos_motors_and_ranges(mjcf):
         limits={"torque_nm": (9.0,) * 7, "velocity_rad_per_s": (1.5,) * 7},
         home_rad=(0.1,) * 7,
     )
+    np.testing.assert_array_equal(scene.model.dof_armature, 0.05)
+    heavy = _scene(mjcf=str(mjcf), base_body="pedestal", joints=NAMES, armature_kg_m2=(0.2,) * 6 + (0.1,))
+    np.testing.assert_array_equal(heavy.model.dof_armature, [0.2] * 6 + [0.1])
     assert set(given.limits.torque) == {9.0}
     assert set(given.limits.velocity) == {1.5}
     assert set(given.home) == {0.1}
@@ -187,6 +190,9 @@ def test_what_is_no_arm_is_refused_naming_it(mjcf, urdf, tmp_path):
     assert "is not between base and flange" in _refused(mjcf=path, joints=("pan", *NAMES[1:]))
     short = {"torque_nm": (1.0,) * 6}
     assert "6 numbers; the arm has 7" in _refused(mjcf=path, base_body="pedestal", joints=NAMES, limits=short)
+    few = (0.1,) * 6
+    keys = {"mjcf": path, "base_body": "pedestal", "joints": NAMES}
+    assert "armature_kg_m2 has 6 numbers" in _refused(**keys, armature_kg_m2=few)
     far = (0.0, 3.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     assert "joint 2 at 3 rad" in _refused(mjcf=path, base_body="pedestal", joints=NAMES, home_rad=far)
     assert "is no URDF" in _refused(urdf=path)
