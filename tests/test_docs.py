@@ -23,6 +23,7 @@ from surgsim.metrics.catalog import METRICS, compute_metrics
 from surgsim.models.config import (
     CapsuleConfig,
     FlangeConfig,
+    HolderConfig,
     InstrumentConfig,
     LimitsConfig,
     RobotConfig,
@@ -147,6 +148,7 @@ def sections():
         "robot: limits": LimitsConfig,
         "robot: capsule": CapsuleConfig,
         "instrument": InstrumentConfig,
+        "instrument: holder": HolderConfig,
         "trocar": TrocarConfig,
         "trocar.wall": WallConfig,
         "start": StartConfig,

@@ -24,6 +24,7 @@ from surgsim.catalog import PartConfig
 from surgsim.models.adopted.arm import adopted
 from surgsim.models.adopted.file import Kind, files_sha256
 from surgsim.models.adopted.problem import AdoptionError
+from surgsim.models.adopted.tool import Tool, read_tool
 from surgsim.models.folders import is_shipped, known_robot, robot_file, with_literal_variant
 
 Vec3 = tuple[FiniteFloat, FiniteFloat, FiniteFloat]
@@ -227,12 +228,42 @@ def placed_errors() -> Iterator[None]:
         raise PydanticCustomError("placed", "{text}", {"text": str(error), "at": error.at}) from error
 
 
-class InstrumentConfig(PartConfig):
-    """Straight rigid laparoscopic shaft on an adapter, along the flange's z axis.
+class HolderConfig(PartConfig):
+    """A rigid, massless holder between flange and instrument.
 
-    The tip is `adapter_length_m + shaft_length_m` from the flange.
+    Attributes:
+        position_m: Of its end in the flange's frame [m].
+        quaternion_wxyz: Of its end in the flange's frame; z is the tool axis.
     """
 
+    position_m: Vec3 = (0.0, 0.0, 0.0)
+    quaternion_wxyz: tuple[FiniteFloat, FiniteFloat, FiniteFloat, FiniteFloat] = (1.0, 0.0, 0.0, 0.0)
+
+    @model_validator(mode="after")
+    def _is_a_turn(self) -> Self:
+        if not any(self.quaternion_wxyz):
+            raise ValueError("quaternion_wxyz must not be zero")
+        return self
+
+
+class InstrumentConfig(PartConfig):
+    """Straight rigid laparoscopic shaft on an adapter, along the flange's z axis; or one from a file.
+
+    The tip is `adapter_length_m + shaft_length_m` from the flange.
+
+    Attributes:
+        mjcf: An MJCF file whose first body is fixed to the flange; lengths, mass and inertia are its own.
+        shaft_entry_site: Site of the file at the start of the shaft.
+        tip_site: Site of the file at the tip: the shaft is straight from the one to the other.
+        files_sha256: Hash of the file and all that it names; filled in, and checked where it is given.
+        holder: A rigid holder between flange and instrument.
+    """
+
+    mjcf: str | None = None
+    shaft_entry_site: str = "shaft_entry"
+    tip_site: str = "tip"
+    files_sha256: str | None = None
+    holder: HolderConfig | None = None
     type: Literal["laparoscopic_straight"] = "laparoscopic_straight"
     shaft_length_m: Annotated[float, Field(gt=0.1, le=0.6)] = 0.40
     shaft_diameter_m: Annotated[float, Field(ge=0.002, le=0.015)] = 0.008
@@ -241,7 +272,53 @@ class InstrumentConfig(PartConfig):
     com_m: Annotated[float, Field(gt=0.0, le=0.3)] = 0.10
 
     @model_validator(mode="after")
-    def _com_is_possible(self) -> Self:
+    def _is_of_a_file_or_made(self) -> Self:
+        if self.mjcf is not None:
+            with placed_errors():
+                self._read_file(Path(self.mjcf))
+            return self
+        for key in OF_TOOL_FILES:
+            if getattr(self, key) != type(self).model_fields[key].default:
+                raise ValueError(f"{key} is for an instrument from a file: give mjcf")
+        return self._checked_com()
+
+    def _read_file(self, path: Path) -> None:
+        """Fill in the whole path, the hash, and the lengths that the file has."""
+        stated = [key for key in OF_ROD if key in self.model_fields_set]
+        if stated:
+            raise AdoptionError(f"{stated[0]} is read from the instrument's file: leave it out", stated[0])
+        found = files_sha256(path, "mjcf")
+        if self.files_sha256 not in (None, found):
+            raise AdoptionError(
+                f"{path} or a file that it names has changed since files_sha256 was written; leave the key "
+                f"out to take it as it now is",
+                "files_sha256",
+            )
+        object.__setattr__(self, "files_sha256", found)  # frozen, but still being made
+        object.__setattr__(self, "mjcf", os.path.abspath(path))
+        for key in ("adapter_length_m", "shaft_length_m"):
+            object.__setattr__(self, key, getattr(self.tool, key))
+
+    @model_serializer(mode="wrap")
+    def _without_what_has_no_use(self, write: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """Of the one from a file what it has itself is left out, of the other the keys for files."""
+        every: dict[str, Any] = write(self)
+        idle = OF_TOOL_FILES if self.mjcf is None else (*OF_ROD, "type")
+        return {key: v for key, v in every.items() if key not in idle and (key != "holder" or v is not None)}
+
+    @property
+    def tool(self) -> Tool:
+        """What its file holds.
+
+        Raises:
+            AdoptionError: If it is no instrument.
+            ValueError: If it is of no file.
+        """
+        if self.mjcf is None or self.files_sha256 is None:
+            raise ValueError("the instrument is of no file")
+        return read_tool(Path(self.mjcf), self.shaft_entry_site, self.tip_site, self.files_sha256)
+
+    def _checked_com(self) -> Self:
         low, high = 0.5 * self.adapter_length_m, self.adapter_length_m + 0.5 * self.shaft_length_m
         if not low <= self.com_m <= high:
             raise ValueError(
@@ -249,6 +326,11 @@ class InstrumentConfig(PartConfig):
                 f"it must be from {low:g} to {high:g}"
             )
         return self
+
+
+OF_TOOL_FILES = ("mjcf", "shaft_entry_site", "tip_site", "files_sha256")
+OF_ROD = ("shaft_length_m", "adapter_length_m", "mass_kg", "com_m")
+"""Keys of the shipped instrument alone."""
 
 
 class WallConfig(PartConfig):

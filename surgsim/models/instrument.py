@@ -3,6 +3,7 @@
 import mujoco
 import numpy as np
 
+from surgsim.models.adopted.tool import tool_spec
 from surgsim.models.config import InstrumentConfig
 from surgsim.models.graft import asset, graft
 from surgsim.spatial import Array
@@ -22,15 +23,32 @@ def attach_instrument(arm: mujoco.MjSpec, config: InstrumentConfig | None) -> No
         flange.parent.add_site(name="shaft_entry", quat=flange.quat, group=4)
         flange.parent.add_site(name="tip", pos=flange.pos, quat=flange.quat, group=4)
     else:
-        graft(arm, instrument_spec(config), site=arm.site("flange"))
+        graft(arm, instrument_spec(config), site=_mount(arm, config))
 
 
 def instrument_spec(config: InstrumentConfig) -> mujoco.MjSpec:
-    """The shipped template with the sizes and the inertia of `config`; origin at the flange, z to the tip."""
+    """The instrument of a file, or the shipped template with the sizes and the inertia of `config`.
+
+    Its origin is at the flange, or at the end of the holder.
+    """
+    if config.mjcf is not None:
+        return tool_spec(config.tool)
     spec = asset(f"instruments/{config.type}.xml")
     _set_inertia(spec.body("instrument"), config)
     _set_sizes(spec, config)
     return spec
+
+
+def _mount(arm: mujoco.MjSpec, config: InstrumentConfig) -> mujoco.MjsSite:
+    """Where the instrument is fixed: the flange, or the end of a rigid holder on it."""
+    flange, holder = arm.site("flange"), config.holder
+    if holder is None:
+        return flange
+    turn, place = np.zeros(4), np.zeros(3)
+    quaternion = np.array(holder.quaternion_wxyz)
+    mujoco.mju_mulQuat(turn, flange.quat, quaternion / np.linalg.norm(quaternion))
+    mujoco.mju_rotVecQuat(place, np.array(holder.position_m), flange.quat)
+    return flange.parent.add_site(name="holder", pos=flange.pos + place, quat=turn, group=4)
 
 
 def rod_masses(config: InstrumentConfig) -> tuple[float, float]:

@@ -89,13 +89,14 @@ def _document(source: Source | Scenario) -> YamlDocument:
 
 
 def _beside_it(document: YamlDocument) -> YamlDocument:
-    """`document` with the path of the arm's file from the scenario's own folder on."""
-    robot = document.tree.get("robot")
-    if not isinstance(robot, dict):
-        return document
-    folder = Path(document.source).parent.absolute()
-    whole = {key: str(folder / robot[key]) for key in KINDS if isinstance(robot.get(key), str)}
-    return replace(document, tree={**document.tree, "robot": {**robot, **whole}})
+    """`document` with the paths of the files of arm and instrument from the scenario's own folder on."""
+    folder, tree = Path(document.source).parent.absolute(), dict(document.tree)
+    for part in ("robot", "instrument"):
+        given = tree.get(part)
+        if isinstance(given, dict):
+            whole = {key: str(folder / given[key]) for key in KINDS if isinstance(given.get(key), str)}
+            tree[part] = {**given, **whole}
+    return replace(document, tree=tree)
 
 
 def _instead(document: YamlDocument, controller: Source | ControllerConfig) -> YamlDocument:

@@ -229,8 +229,9 @@ class Scenario(PartConfig):
         return data
 
     def sha256(self) -> str:
-        """Hash of the resolved scenario; of an arm from a file its content counts, not where it stands."""
+        """Hash of the resolved scenario; of a file that it names the content counts, not where it stands."""
         resolved = self.resolved()
-        robot = {key: Path(v).name if key in KINDS else v for key, v in resolved["robot"].items()}
-        text = json.dumps({**resolved, "robot": robot}, sort_keys=True, separators=(",", ":"))
+        for part in filter(None, (resolved["robot"], resolved["instrument"])):
+            part.update({key: Path(part[key]).name for key in KINDS if key in part})
+        text = json.dumps(resolved, sort_keys=True, separators=(",", ":"))
         return hashlib.sha256(text.encode()).hexdigest()

@@ -7,7 +7,6 @@ import numpy as np
 
 from surgsim.models.adopted.capsules import Capsule
 from surgsim.models.adopted.findings import Findings
-from surgsim.models.adopted.links import Link
 from surgsim.models.adopted.surface import Surface
 from surgsim.spatial import Array
 
@@ -27,13 +26,13 @@ def mechanics_of(found: Findings, home: Array | None) -> mujoco.MjSpec:
         body = body.add_body(name=name)
         if above is not None:
             body.pos = above.R_WL.T @ (link.p_WL - above.p_WL)
-            body.quat = _quaternion(above.R_WL.T @ link.R_WL)
-        _set_inertia(body, link)
+            body.quat = quaternion(above.R_WL.T @ link.R_WL)
+        set_inertia(body, link.mass, link.com, link.inertia)
         if i > 0:
             _add_joint(body, found, i - 1)
         above = link
     p, R = flange_in_last_link(found)
-    body.add_site(name="flange", pos=p, quat=_quaternion(R), group=4)
+    body.add_site(name="flange", pos=p, quat=quaternion(R), group=4)
     for i in range(n):
         motor = spec.add_actuator(name=f"motor{i + 1}", target=f"joint{i + 1}")
         motor.trntype = mujoco.mjtTrn.mjTRN_JOINT
@@ -49,11 +48,12 @@ def mechanics_of(found: Findings, home: Array | None) -> mujoco.MjSpec:
     return spec
 
 
-def _set_inertia(body: mujoco.MjsBody, link: Link) -> None:
+def set_inertia(body: mujoco.MjsBody, mass: float, com: Array, inertia: Array) -> None:
+    """Give a body its mass [kg], and inertia (3, 3) [kg m²] about its centre of mass (3,) [m]."""
     body.explicitinertial = True
-    body.mass, body.ipos = link.mass, link.com
-    if link.mass > 0.0:
-        body.fullinertia = [link.inertia[i] for i in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))]
+    body.mass, body.ipos = mass, com
+    if mass > 0.0:
+        body.fullinertia = [inertia[i] for i in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))]
 
 
 def _add_joint(body: mujoco.MjsBody, found: Findings, i: int) -> None:
@@ -113,7 +113,8 @@ def _label(path: Path) -> str:
     return "".join(c if c.isalnum() or c == "_" else "_" for c in path.stem) or "arm"
 
 
-def _quaternion(turn: Array) -> Array:
+def quaternion(turn: Array) -> Array:
+    """Of a matrix of axes (3, 3), as wxyz (4,)."""
     found = np.zeros(4)
     mujoco.mju_mat2Quat(found, np.ascontiguousarray(turn).ravel())
     return found

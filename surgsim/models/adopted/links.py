@@ -1,5 +1,6 @@
 """What moves as one: the bodies that hang rigidly together at each link, and their inertia."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import mujoco
@@ -120,17 +121,11 @@ def _link(model: mujoco.MjModel, data: mujoco.MjData, bodies: tuple[int, ...]) -
     p_WL, R_WL = data.xpos[own].copy(), data.xmat[own].reshape(3, 3).copy()
     masses = model.body_mass[list(bodies)]
     mass = float(masses.sum())
-    if len(bodies) == 1 or mass == 0.0 or masses[0] == mass:
+    if len(bodies) == 1 or mass == 0.0 or masses[0] == mass:  # as it is, to the last bit
         com, turn = model.body_ipos[own].copy(), _matrix(model.body_iquat[own])
         inertia = turn @ np.diag(model.body_inertia[own]) @ turn.T
         return Link(bodies=bodies, p_WL=p_WL, R_WL=R_WL, mass=mass, com=com, inertia=inertia)
-    com_W = masses @ data.xipos[list(bodies)] / mass
-    inertia_W = np.zeros((3, 3))
-    for body, m in zip(bodies, masses, strict=True):
-        turn, r = data.ximat[body].reshape(3, 3), data.xipos[body] - com_W
-        inertia_W += turn @ np.diag(model.body_inertia[body]) @ turn.T + m * (
-            r @ r * np.eye(3) - np.outer(r, r)
-        )
+    com_W, inertia_W = inertia_together(model, data, bodies)
     return Link(
         bodies=bodies,
         p_WL=p_WL,
@@ -139,6 +134,20 @@ def _link(model: mujoco.MjModel, data: mujoco.MjData, bodies: tuple[int, ...]) -
         com=R_WL.T @ (com_W - p_WL),
         inertia=R_WL.T @ inertia_W @ R_WL,
     )
+
+
+def inertia_together(
+    model: mujoco.MjModel, data: mujoco.MjData, bodies: Sequence[int]
+) -> tuple[Array, Array]:
+    """Centre of mass (3,) [m] and inertia about it (3, 3) [kg m²] of bodies as one, world frame."""
+    masses = model.body_mass[list(bodies)]
+    com: Array = masses @ data.xipos[list(bodies)] / masses.sum()
+    inertia = np.zeros((3, 3))
+    for body, mass in zip(bodies, masses, strict=True):
+        turn, r = data.ximat[body].reshape(3, 3), data.xipos[body] - com
+        own = turn @ np.diag(model.body_inertia[body]) @ turn.T
+        inertia += own + mass * (r @ r * np.eye(3) - np.outer(r, r))
+    return com, inertia
 
 
 def _matrix(quaternion: Array) -> Array:

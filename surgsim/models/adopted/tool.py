@@ -1,0 +1,135 @@
+"""An instrument from somebody's file, in the form that the package's own instrument has.
+
+The file's first body is fixed to the flange. Two sites say where the shaft is: it is straight from the one to
+the other, and the remote centre of motion is held on that line.
+"""
+
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+
+import mujoco
+import numpy as np
+
+from surgsim.models.adopted.file import read_file
+from surgsim.models.adopted.form import draw, quaternion, set_inertia
+from surgsim.models.adopted.links import inertia_together
+from surgsim.models.adopted.problem import AdoptionError, listed
+from surgsim.models.adopted.surface import Surface, coarser, surface_of
+from surgsim.spatial import Array
+
+_LEAST_SHAFT_M, _MOST_SHAFT_M = 0.05, 1.0
+_MOST_DRAWN = 6000
+"""Triangles of a drawn mesh."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Tool:
+    """An instrument from a file. Its frame has z along the shaft, towards the tip.
+
+    Attributes:
+        p_ET: Origin of its frame in that of the flange (3,) [m]: the shaft's line nearest to the flange.
+        R_ET: Axes of its frame there (3, 3).
+        adapter_length_m: From its origin to the start of the shaft.
+        shaft_length_m: From there to the tip.
+        mass: [kg].
+        com: Centre of mass in its frame (3,) [m].
+        inertia: About the centre of mass, along its axes (3, 3) [kg m²].
+        surfaces: What is drawn.
+    """
+
+    p_ET: Array
+    R_ET: Array
+    adapter_length_m: float
+    shaft_length_m: float
+    mass: float
+    com: Array
+    inertia: Array
+    surfaces: tuple[Surface, ...]
+
+
+@lru_cache(maxsize=16)
+def read_tool(path: Path, entry_site: str, tip_site: str, files_sha256: str) -> Tool:
+    """The instrument in the MJCF file at `path`; its joints, of jaws for instance, stay at their zero.
+
+    Args:
+        path: The file.
+        entry_site: Site at the start of the shaft.
+        tip_site: Site at the tip.
+        files_sha256: Hash of the file, so that another content is read again.
+
+    Raises:
+        AdoptionError: If it is no instrument.
+    """
+    del files_sha256
+    model = read_file(path, "mjcf").model
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    mujoco.mj_comPos(model, data)
+    if model.nbody < 2:
+        raise AdoptionError(f"{path} has no body", "mjcf")
+    root = 1
+    bodies = [body for body in range(1, model.nbody) if model.body_rootid[body] == root]
+    entry, tip = (
+        data.site_xpos[_site(model, name, key)]
+        for name, key in ((entry_site, "shaft_entry_site"), (tip_site, "tip_site"))
+    )
+    length = float(np.linalg.norm(tip - entry))
+    if not _LEAST_SHAFT_M <= length <= _MOST_SHAFT_M:
+        raise AdoptionError(
+            f"the shaft from site '{entry_site}' to site '{tip_site}' is {length:.3f} m long; it must be "
+            f"{_LEAST_SHAFT_M:g} to {_MOST_SHAFT_M:g} m",
+            "tip_site",
+        )
+    if not model.body_mass[bodies].sum() > 0.0:
+        raise AdoptionError(f"{path} has no mass", "mjcf")
+    axis, p_WE, R_WE = (tip - entry) / length, data.xpos[root], data.xmat[root].reshape(3, 3)
+    adapter = max(0.0, float((entry - p_WE) @ axis))
+    origin, R_WT = entry - adapter * axis, _axes(axis, R_WE)
+    com, inertia = inertia_together(model, data, bodies)
+    geoms = [g for g in range(model.ngeom) if model.geom_bodyid[g] in bodies and model.geom_rgba[g][3] > 0.0]
+    surfaces = (surface_of(model, data, geom, origin, R_WT) for geom in geoms)
+    return Tool(
+        p_ET=R_WE.T @ (origin - p_WE),
+        R_ET=R_WE.T @ R_WT,
+        adapter_length_m=adapter,
+        shaft_length_m=length,
+        mass=float(model.body_mass[bodies].sum()),
+        com=R_WT.T @ (com - origin),
+        inertia=R_WT.T @ inertia @ R_WT,
+        surfaces=tuple(s for s in surfaces if s is not None and len(s.faces)),
+    )
+
+
+def _axes(z: Array, like: Array) -> Array:
+    """Axes (3, 3) whose third is `z`, turned from those of `like` no more than needed."""
+    x = like[:, 0] - (like[:, 0] @ z) * z
+    if np.linalg.norm(x) < 1e-6:
+        x = like[:, 1] - (like[:, 1] @ z) * z
+    x /= np.linalg.norm(x)
+    return np.stack([x, np.cross(z, x), z], axis=1)
+
+
+def _site(model: mujoco.MjModel, name: str, key: str) -> int:
+    found = int(mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_SITE, name))
+    if found < 0:
+        known = listed(model.site(i).name for i in range(model.nsite))
+        raise AdoptionError(f"the file has no site '{name}'. Sites: {known}.", key)
+    return found
+
+
+def tool_spec(tool: Tool) -> mujoco.MjSpec:
+    """The instrument alone, its flange at the origin: `instrument` with `shaft_entry`, `tip` and `jaws`."""
+    spec = mujoco.MjSpec()
+    spec.modelname = "instrument_from_file"
+    spec.compiler.degree = False
+    spec.compiler.balanceinertia = False
+    body = spec.worldbody.add_body(name="instrument", pos=tool.p_ET, quat=quaternion(tool.R_ET))
+    set_inertia(body, tool.mass, tool.com, tool.inertia)
+    entry, tip = tool.adapter_length_m, tool.adapter_length_m + tool.shaft_length_m
+    body.add_site(name="shaft_entry", pos=[0.0, 0.0, entry], group=4)
+    body.add_site(name="tip", pos=[0.0, 0.0, tip], group=4)
+    body.add_body(name="jaws", pos=[0.0, 0.0, tip])
+    for i, surface in enumerate(tool.surfaces):
+        draw(spec, "instrument", f"instrument_{i}", coarser(surface, _MOST_DRAWN))
+    return spec
