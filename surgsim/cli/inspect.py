@@ -70,7 +70,7 @@ def execute(options: argparse.Namespace) -> int:
 def _one(path: Path, options: argparse.Namespace) -> int:
     from surgsim.cli.table import print_prose
     from surgsim.errors import Outcome
-    from surgsim.metrics.catalog import compute_metrics
+    from surgsim.metrics.catalog import evaluate
     from surgsim.recording import view
     from surgsim.recording.export import check_export, export
     from surgsim.recording.read import read_recording
@@ -79,9 +79,13 @@ def _one(path: Path, options: argparse.Namespace) -> int:
     if options.export:
         check_export(options.export)
     recorded = read_recording(path)
-    metrics = compute_metrics(recorded.trace)
+    evaluation = evaluate(recorded.trace)
+    missing = evaluation.missing(recorded.metrics)
+    metrics = {**evaluation.values, **{name: recorded.metrics[name] for name in missing}}
     found = differences(recorded.metrics, metrics)
     _print(recorded.trace, metrics, found, as_json=options.json)
+    for name, reason in missing.items():
+        print_prose(f"{name} is as stored; it cannot be computed again here: {reason}", sys.stderr)
     if options.export:
         export(recorded.trace, options.export)
         print_prose(f"wrote {options.export}, {len(recorded.trace)} rows", sys.stderr)

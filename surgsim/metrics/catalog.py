@@ -52,10 +52,20 @@ class Evaluation:
     Attributes:
         values: Every metric; None where the trace does not define it, e.g. an RCM error without a trocar.
         undefined: Why, for each metric that could not be computed: the error that it raised.
+        broken: Those of them that raised something else than `Undefined`: a bug.
     """
 
     values: Mapping[str, float | None]
     undefined: Mapping[str, str]
+    broken: frozenset[str] = frozenset()
+
+    def missing(self, stored: Mapping[str, float | None]) -> dict[str, str]:
+        """Why, for each metric that has a value in `stored` and cannot be computed here."""
+        return {
+            name: reason
+            for name, reason in self.undefined.items()
+            if name not in self.broken and stored.get(name) is not None
+        }
 
 
 def evaluate(trace: Trace) -> Evaluation:
@@ -63,12 +73,15 @@ def evaluate(trace: Trace) -> Evaluation:
     active = trace.active()
     values: dict[str, float | None] = {}
     undefined: dict[str, str] = {}
+    broken: set[str] = set()
     for name, metric in METRICS.items():
         try:
             values[name] = _finite(metric.compute(trace if metric.whole else active))
         except Exception as error:  # whatever it is: the run is done, and is not to be lost
             values[name], undefined[name] = None, _reason(error)
-    return Evaluation(values=values, undefined=undefined)
+            if not isinstance(error, Undefined):
+                broken.add(name)
+    return Evaluation(values=values, undefined=undefined, broken=frozenset(broken))
 
 
 def compute_metrics(trace: Trace) -> dict[str, float | None]:

@@ -6,6 +6,7 @@ from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import ValidationError
 
 from surgsim.control.self_motion import SelfMotion, SelfMotionPoint
 from surgsim.metrics.metric import CHOICE, Metric, Undefined
@@ -138,7 +139,11 @@ def _scene_of(trace: Trace) -> str:
 
 @lru_cache(maxsize=8)
 def _manifold_of(scene: str) -> SelfMotion:
-    return SelfMotion(ArmModel(SceneConfig.model_validate_json(scene)), margin_rad=0.0)
+    try:
+        config = SceneConfig.model_validate_json(scene)
+    except ValidationError as error:  # of an arm whose files are not here, or are others by now
+        raise Undefined("; ".join(problem["msg"] for problem in error.errors())) from error
+    return SelfMotion(ArmModel(config), margin_rad=0.0)
 
 
 METRICS = (
