@@ -146,7 +146,7 @@ def test_a_wrong_command_exits_2_with_the_usage(capsys, words):
 
 
 MISTYPED = {
-    "command": (["rnu"], "'rnu' is not a command. Known: bench, check, "),
+    "command": (["rnu"], "'rnu' is not a command. Known: adopt, bench, check, "),
     "kind": (["list", "controler"], "'controler' is not a kind. Known: controllers, "),
     "option": (
         ["run", "circle_lwr4plus", "--contrller", "qp"],
