@@ -150,7 +150,9 @@ def test_a_start_that_touches_is_refused_where_every_other_one_touches_too():
     """The shaft is in nearly up to its adapter."""
     arm, scene = made("lwr4plus", (0.0, 0.5, 0.2), shaft_length_m=0.2, com_m=0.08)
     deep, less = np.array([[0.0, 0.595, 0.014]]), np.array([[0.0, 0.58, 0.06]])
-    with pytest.raises(UnreachableError, match=r"no start is clear of contact .* adapter touches the patient"):
+    with pytest.raises(
+        UnreachableError, match=r"no start is clear of contact .* adapter touches the patient"
+    ):
         solved(arm, scene, deep, clear=True)
     reach = Reach(arm, scene)
     assert reach.contact(deep, solved(arm, scene, deep)).startswith("adapter touches the patient")
