@@ -83,8 +83,10 @@ def items_of(kind: str) -> list[tuple[str, str]]:
 
 
 def _files(kind: str) -> list[tuple[str, str]]:
+    from surgsim.scenario.drawn import drawn_names
     from surgsim.scenario.load import shipped, shipped_safety
     from surgsim.scenario.yaml_text import read_yaml
 
     files = shipped(kind) if kind != "scenarios" else {**shipped(), **shipped_safety()}
-    return [(name, str(read_yaml(path).tree.get("description", ""))) for name, path in files.items()]
+    listed = [(name, str(read_yaml(path).tree.get("description", ""))) for name, path in files.items()]
+    return listed if kind != "scenarios" else [*listed, *drawn_names().items()]

@@ -8,6 +8,7 @@ from surgsim.compare.engine import Runner
 from surgsim.compare.suite import SuiteConfig, ad_hoc_suite, is_suite, load_suite
 from surgsim.compare.workers import run_jobs
 from surgsim.errors import ScenarioError, SurgsimError, unknown_name
+from surgsim.scenario.drawn import drawn_names
 from surgsim.scenario.load import shipped
 
 
@@ -34,8 +35,13 @@ def suite_named(names: Sequence[str], given: Container[str] = ()) -> tuple[Suite
 
 def _check_name(name: str) -> None:
     """Refuse a name that is neither a shipped suite's nor a scenario's, and no path."""
-    known = [*shipped("suites"), *shipped()]
-    if name not in known and len(Path(name).parts) < 2 and not Path(name).suffix:
+    known = [*shipped("suites"), *shipped(), *drawn_names()]
+    if (
+        name not in known
+        and not name.startswith("random_")
+        and len(Path(name).parts) < 2
+        and not Path(name).suffix
+    ):
         text = unknown_name(name, "shipped suite or scenario", known)
         raise ScenarioError("", f"{text} Or give a .yaml file.")
 

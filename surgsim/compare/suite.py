@@ -16,6 +16,7 @@ from surgsim.compare.axis import AxisConfig, Values
 from surgsim.compare.matters import checked_matters
 from surgsim.errors import ScenarioError, SurgsimError, unknown_name
 from surgsim.metrics.catalog import METRICS
+from surgsim.scenario.drawn import drawn_names
 from surgsim.scenario.load import find, load_scenario, shipped
 from surgsim.scenario.schema import Scenario
 from surgsim.scenario.validate import validate
@@ -274,7 +275,8 @@ def check_runs(specs: Sequence[RunSpec]) -> list[Scenario]:
     scenarios: dict[tuple[Any, ...], Scenario] = {}
     checked = []
     for spec in specs:
-        key = (spec.scenario, spec.controller, spec.assignments, spec.settings)
+        drawn = spec.seed if spec.scenario in drawn_names() else None
+        key = (spec.scenario, drawn, spec.controller, spec.assignments, spec.settings)
         if key not in scenarios:
             scenarios[key] = spec.load()
         checked.append(scenarios[key].model_copy(update={"seed": spec.seed}))

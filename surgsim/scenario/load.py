@@ -12,6 +12,7 @@ from surgsim.control.controller import ControllerConfig
 from surgsim.errors import ScenarioError, unknown_name
 from surgsim.models.config import KINDS
 from surgsim.resources import resource_dir
+from surgsim.scenario.drawn import drawn_document
 from surgsim.scenario.plain import document_of
 from surgsim.scenario.schema import Scenario
 from surgsim.scenario.validate import validate
@@ -61,7 +62,8 @@ def load_scenario(
     """Load a scenario by path or shipped name, or check one that is given.
 
     Args:
-        source: Path of a YAML file, name of a shipped scenario, the content as a mapping, or a scenario.
+        source: Path of a YAML file, name of a shipped or drawn scenario, the content as a mapping, or a
+            scenario. A drawn one without a number in its name is that of the seed.
         controller: Controller to use instead of the scenario's own: a path, a shipped name, or the content.
         assignments: `key.path=value` overrides, applied after the controller is put in place.
         seed: Seed to use instead of the scenario's own.
@@ -69,7 +71,7 @@ def load_scenario(
     Raises:
         ScenarioError: If anything is wrong, naming file, line and key.
     """
-    document = _document(source)
+    document = _document(source, seed)
     if controller is not None:
         document = _instead(document, controller)
     document = _with_controller(document, from_option=controller is not None)
@@ -80,7 +82,9 @@ def load_scenario(
     return validate(Scenario, document)
 
 
-def _document(source: Source | Scenario) -> YamlDocument:
+def _document(source: Source | Scenario, seed: int | None) -> YamlDocument:
+    if isinstance(source, str) and (drawn := drawn_document(source, seed)) is not None:
+        return drawn
     if isinstance(source, str | os.PathLike):
         return _beside_it(read_yaml(find(source, "", "scenario")))
     if isinstance(source, Mapping | Scenario):
