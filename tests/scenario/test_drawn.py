@@ -5,7 +5,7 @@ import pytest
 
 from surgsim.compare.suite import SuiteConfig, check_runs, expand, load_suite
 from surgsim.errors import ScenarioError
-from surgsim.models.robot import robot_names
+from surgsim.models.folders import robot_names
 from surgsim.scenario.drawn import drawn_names
 from surgsim.scenario.load import load_scenario
 
