@@ -67,6 +67,8 @@ SHORTER = {
     "--out runs/robustness": "--controllers vprnn",
     "surgsim compare frontier --seeds 0:1 --out runs/frontier": "--controllers joint_impedance",
     "surgsim compare torque_level --out runs/torque_level": "--controllers rcm_inverse_dynamics",
+    "surgsim adopt desk_arm.xml --flange tool "
+    "--set 'limits.velocity_rad_per_s=[2, 2, 2, 2, 3, 3, 3]'": "--quick",
     "surgsim bench": "--duration 3",
     "surgsim bench --only ticks,stages --cases circle/vprnn,kinematic/pinv": "--duration 3",
     "surgsim bench --only libraries --json": "--duration 3",
@@ -152,16 +154,24 @@ def run_all(surgsim, folder, page, typed):
     for command in typed:
         for columns in (80, 120):
             added = f"{SHORTER.get(command, '')} {again(command) if columns == 120 else ''}"
-            program, *words = shlex.split(f"{command} {added}")
+            variables, (program, *words) = with_variables(shlex.split(f"{command} {added}"))
             assert program == "surgsim", f"list {command} in NOT_HERE with a reason, or run it here"
             poor = {} if command == TWO else {"MUJOCO_GL": "disable"}
-            done = surgsim(*words, columns=columns, cold=cold, env=poor).wait(timeout_s=600.0)
+            done = surgsim(*words, columns=columns, cold=cold, env=poor | variables).wait(timeout_s=600.0)
             print(f"$ {command} {added}\n{done.text}")
             assert done.status == STATUS.get(command, 0), command
             assert "Traceback" not in done.text
             assert too_wide(done.lines, columns) == []
             assert broken(done.lines) == []
             cold = False
+
+
+def with_variables(words):
+    """The variables that `env` sets in front of a command, and the command."""
+    if words[0] != "env":
+        return {}, words
+    count = next(i for i, word in enumerate(words[1:], start=1) if "=" not in word)
+    return dict(word.split("=", 1) for word in words[1:count]), words[count:]
 
 
 def again(command):
