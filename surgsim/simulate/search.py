@@ -21,6 +21,7 @@ _APART_RAD = 0.4
 _COARSE, _FINE = ((0.4, 0.01), 100), ((0.05, 0.002), 30)
 """First and last length of the steps of the two improvements [rad], and how many are tried at most."""
 _TIE_RAD = 1e-3
+_LAST_SETTLINGS = 4
 
 
 def roomiest(reach: Reach, places: Array, guess: Array, *, clear: bool) -> Start:
@@ -42,7 +43,12 @@ def roomiest(reach: Reach, places: Array, guess: Array, *, clear: bool) -> Start
     better = [reach.improved(some, each, directions, *_COARSE) for each in chosen]
     last = [reach.start(every, each.q) for each in _apart(better, guess)[:_FINALISTS]]
     best = _apart([reach.improved(every, each, directions, *_FINE) for each in last], guess)[0]
-    return reach.start(every, reach.turned_inside(every, best.q))
+    q = reach.turned_inside(every, best.q)
+    for _ in range(
+        _LAST_SETTLINGS
+    ):  # near a singularity one is not enough; following a path is the first one
+        q = reach.settle(places[0], q)
+    return reach.start(every, q)
 
 
 def _first_guesses(reach: Reach, rng: np.random.Generator, guess: Array) -> Array:

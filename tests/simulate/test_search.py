@@ -181,3 +181,18 @@ def test_a_shaft_that_would_point_out_of_the_patient_is_no_start():
         UnreachableError, match=r"the start at .* leaves the tip .*joint 6 at the position limit"
     ):
         solved(arm, scene, place)
+
+
+@pytest.mark.parametrize(
+    ("position", "axis", "place"),
+    [
+        ((-0.50136, -0.16307, 0.23173), (-0.07945, -0.08378, 0.99331), (-0.49559, -0.15698, 0.15952)),
+        ((-0.49527, -0.14161, 0.21202), (-0.15119, 0.14151, 0.97832), (-0.4691, -0.16610, 0.04267)),
+    ],
+)
+def test_a_start_that_takes_long_to_settle_is_given_as_it_is_at_the_end(position, axis, place):
+    """These were found, and refused: the configuration was handed on before it had come to its place."""
+    arm, scene = made("test_arm_6", position, axis)
+    q = solved(arm, scene, np.array([place]))
+    assert np.linalg.norm(rows(arm, scene, np.array(place), q)[0]) < 1e-8
+    assert next(random_starts(arm, scene, np.array(place), 60, 0), None) is not None
