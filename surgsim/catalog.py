@@ -53,13 +53,17 @@ class PartConfig(BaseModel):
         """
 
 
+NAME = re.compile(r"[a-z0-9][a-z0-9_]{0,63}")
+"""What is safe as a file's name."""
+
+
 def check_name(name: str) -> str:
     """`name`, if it is safe as a file's.
 
     Raises:
         ValueError: If it is not.
     """
-    if not re.fullmatch(r"[a-z0-9][a-z0-9_]{0,63}", name):
+    if not NAME.fullmatch(name):
         raise ValueError(f"'{name}' must be lower-case letters, digits and underscores, at most 64")
     return name
 

@@ -1,5 +1,7 @@
 """A robot's folder: its MJCF and meshes, the card, and the map of ports."""
 
+import hashlib
+import json
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,7 +19,7 @@ from surgsim.runs.drafts import draft_of
 from surgsim.runs.exchange import put_in_place
 from surgsim.runs.folder import RunResult, execute
 
-CARD, MAP = "README.md", "ports.png"
+CARD, MAP, MANIFEST = "README.md", "ports.png", "robot.json"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -90,18 +92,16 @@ def adopt(
 
 
 def write_robot_folder(folder: Path, adoption: Adoption) -> None:
-    """Write the arm's folder in one step; one that is there is replaced if it is a robot's.
+    """Write the arm's folder in one step; one that is there is replaced if it was written so, and not edited.
 
     Raises:
         SurgsimError: If the folder holds something else, or the disk refuses.
     """
     name = adoption.name
-    if folder.exists() and not (folder / f"{name}.xml").is_file():
-        raise SurgsimError(
-            f"{folder} is there and is no folder of robot '{name}': give another --out or --name"
-        )
+    _check_folder(folder, name)
     arm = adopted(adoption.robot)
     files = model_files(arm.mechanics, name, arm.drawn, ["Written by surgsim adopt.", *_origin(adoption)])
+    files[MANIFEST] = _manifest(adoption, files[f"{name}.xml"])
     files[CARD] = card_text(adoption).encode()
     if adoption.ports is not None:
         files[MAP] = port_picture(adoption.ports, name)
@@ -115,6 +115,38 @@ def write_robot_folder(folder: Path, adoption: Adoption) -> None:
             put_in_place(draft, folder)
     except OSError as error:
         raise SurgsimError(f"{folder} cannot be written: {error.strerror or error}") from error
+
+
+def _check_folder(folder: Path, name: str) -> None:
+    """Refuse to replace what is no robot's folder of ours, or was edited since.
+
+    Raises:
+        SurgsimError: With the reason.
+    """
+    if not folder.exists():
+        return
+    other = f"{folder} is there and was not written by surgsim adopt: give another --out or --name"
+    try:
+        manifest = json.loads((folder / MANIFEST).read_text(encoding="utf-8"))
+        written = manifest["model_sha256"]
+        model = (folder / f"{name}.xml").read_bytes()
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise SurgsimError(other) from error
+    if hashlib.sha256(model).hexdigest() != written:
+        raise SurgsimError(f"{folder}/{name}.xml was edited since it was written: move the folder away first")
+
+
+def _manifest(adoption: Adoption, model: bytes) -> bytes:
+    """Where the folder is from, as JSON."""
+    path, kind = adoption.robot.file
+    content = {
+        "name": adoption.name,
+        "file": path.name,
+        "kind": kind,
+        "files_sha256": adoption.robot.files_sha256,
+        "model_sha256": hashlib.sha256(model).hexdigest(),
+    }
+    return (json.dumps(content, indent=2) + "\n").encode()
 
 
 def _origin(adoption: Adoption) -> list[str]:

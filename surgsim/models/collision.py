@@ -13,16 +13,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surgsim.models.adopted.capsules import capsules_in
-from surgsim.models.config import SceneConfig
+from surgsim.models.adopted.collisions import ADAPTER_M, ADAPTER_RADIUS_M
+from surgsim.models.adopted.touching import NEXT_THAT_CAN_TOUCH
+from surgsim.models.config import InstrumentConfig, SceneConfig
 from surgsim.models.graft import asset
 from surgsim.models.robot import joint_names, link_names
 from surgsim.models.theatre import patient_place
 
 Array = NDArray[np.float64]
 Ids = NDArray[np.intp]
-_ADAPTER_RADIUS_M = 0.026
 NEVER_TOUCH = "never_touch"
-_NEXT_THAT_CAN_TOUCH = 3  # along the chain: nearer ones are held apart by the joints' ranges
 _TABLE_CENTRE_M, _TABLE_HALF_M = (0.0, -0.13, -0.223), (0.268, 0.98, 0.054)  # pads and top of the drawn table
 
 
@@ -59,8 +59,8 @@ def collision_shapes(model: mujoco.MjModel, config: SceneConfig) -> CollisionSha
     if config.instrument is not None:
         entry, tip = config.instrument.adapter_length_m, config.instrument.shaft_length_m
         tip += entry
-        below = (0.0, 0.0, max(0.0, entry - _ADAPTER_RADIUS_M))
-        capsules.append(("adapter", "instrument", np.zeros(3), np.array(below), _ADAPTER_RADIUS_M))
+        below = (0.0, 0.0, max(0.0, entry - ADAPTER_RADIUS_M))
+        capsules.append(("adapter", "instrument", np.zeros(3), np.array(below), ADAPTER_RADIUS_M))
         radius = 0.5 * config.instrument.shaft_diameter_m
         ends = np.array([0.0, 0.0, entry]), np.array([0.0, 0.0, tip - radius])
         capsules.append(("shaft", "instrument", *ends, radius))
@@ -70,7 +70,7 @@ def collision_shapes(model: mujoco.MjModel, config: SceneConfig) -> CollisionSha
         bodies=np.array([model.body(body).id for _, body, *_ in capsules], dtype=np.intp),
         ends=np.array([[one, other] for *_, one, other, _ in capsules]),
         radii=np.array([radius for *_, radius in capsules]),
-        pairs=_pairs(names, (*bodies, "adapter", "shaft"), _left_out(model)),
+        pairs=_pairs(names, (*bodies, "adapter", "shaft"), _left_out(model, config.instrument)),
         shaft=names.index("shaft") if "shaft" in names else -1,
         patient=_patient(config),
     )
@@ -84,13 +84,17 @@ def _capsules(model: mujoco.MjModel, body: str) -> list[tuple[Array, Array, floa
     return [(*capsule.ends, capsule.radius) for capsule in found]
 
 
-def _left_out(model: mujoco.MjModel) -> set[tuple[str, str]]:
-    """Pairs that the arm's text `never_touch` names."""
+def _left_out(model: mujoco.MjModel, instrument: InstrumentConfig | None) -> set[tuple[str, str]]:
+    """Pairs that the arm's text `never_touch` names; its adapter is a short one on the flange itself."""
     if mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_TEXT, NEVER_TOUCH) < 0:
         return set()
     text = model.text(NEVER_TOUCH).data
     words = (text if isinstance(text, str) else bytes(text).decode()).strip("\0 ").split()
-    return {(one, other) for one, _, other in (word.partition("-") for word in words)}
+    pairs = {(one, other) for one, _, other in (word.partition("-") for word in words)}
+    usual = instrument is not None and instrument.mjcf is None and instrument.holder is None
+    if usual and instrument is not None and instrument.adapter_length_m <= ADAPTER_M:
+        return pairs
+    return {pair for pair in pairs if "adapter" not in pair}
 
 
 def _pairs(names: tuple[str, ...], along: tuple[str, ...], left_out: set[tuple[str, str]]) -> Ids:
@@ -104,7 +108,7 @@ def _pairs(names: tuple[str, ...], along: tuple[str, ...], left_out: set[tuple[s
         (i, j)
         for i, one in enumerate(names)
         for j, other in enumerate(names)
-        if place[other] - place[one] >= _NEXT_THAT_CAN_TOUCH and (one, other) not in near
+        if place[other] - place[one] >= NEXT_THAT_CAN_TOUCH and (one, other) not in near
     ]
     return np.array(pairs, dtype=np.intp).reshape(-1, 2)
 

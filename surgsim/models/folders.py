@@ -17,6 +17,7 @@ from pathlib import Path
 
 import mujoco
 
+from surgsim.catalog import NAME
 from surgsim.errors import SurgsimError, unknown_name
 from surgsim.models.graft import read_mjcf
 from surgsim.plugins import offers
@@ -117,7 +118,7 @@ def _found(folder: Path) -> Iterator[tuple[str, Path]]:
     if not folder.is_dir():
         return
     for path in (folder.absolute(), *sorted(folder.iterdir())):
-        if (file := path / f"{path.name}.xml").is_file():
+        if NAME.fullmatch(path.name) and (file := path / f"{path.name}.xml").is_file():
             yield path.name, file
 
 

@@ -1,6 +1,7 @@
 """Start configuration: can the instrument follow its path through the trocar, and from which joints?"""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -77,7 +78,9 @@ def _near(reach: Reach, places: Array, posture: Array) -> Start | None:
     q = near_posture(reach, places[0], posture)
     if q is None or reach.p_WC is None:
         return None if q is None else Start(q=q, worth=np.inf, room_rad=np.inf)
-    start = reach.start(reach.path(places, clear=False), q)
+    path = reach.path(places, clear=False)
+    start = reach.start(path, q)
+    start = replace(start, q=reach.turned_inside(path, start.q))
     return start if start.room_rad > -np.inf and reach.points_inwards(q) else None
 
 

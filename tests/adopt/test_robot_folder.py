@@ -95,7 +95,7 @@ def test_what_it_cannot_write_over_it_leaves(tmp_path, named, capsys):
     (named / "their_arm").mkdir(parents=True)
     (named / "their_arm" / "notes.txt").write_text("mine")
     assert _adopted(tmp_path, named, "--name", "their_arm") == 2
-    assert "is no folder of robot 'their_arm'" in capsys.readouterr().err
+    assert "was not written by surgsim adopt" in capsys.readouterr().err
     assert [file.name for file in (named / "their_arm").iterdir()] == ["notes.txt"]
 
 

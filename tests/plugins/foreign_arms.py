@@ -134,7 +134,7 @@ def urdf_text(n: int = 6) -> str:
             step=0.15,
             turn=0.0 if i == 1 else np.pi / 2 * (-1) ** i,
             velocity=1.0 + 0.1 * i,
-            effort=150 - 20 * i,
+            effort=max(20, 150 - 20 * i),
         )
         for i in range(1, n + 1)
     ]

@@ -79,7 +79,7 @@ def _adopted(robot: "RobotConfig") -> Adopted:
     apart, joined = pairs_left_out(spec, capsules, points, found.limits, home)
     if pairs := (*apart, *joined):
         add_text(spec, "never_touch", " ".join(f"{one}-{other}" for one, other in pairs))
-    card = card_of(found, capsules, joined, remark)
+    card = card_of(found, capsules, solid, joined, remark)
     add_text(spec, "description", _described(found.file.path, card))
     return Adopted(mechanics=spec, surfaces=drawn, card=card)
 

@@ -1,6 +1,6 @@
 """What was found in an arm's file, what was assumed, and what it lacks."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 
@@ -13,6 +13,7 @@ from surgsim.models.adopted.findings import Findings
 from surgsim.models.adopted.form import flange_in_last_link
 from surgsim.models.adopted.links import Link
 from surgsim.models.adopted.problem import listed
+from surgsim.models.adopted.surface import Surface
 from surgsim.spatial import Array
 
 _ALIGNED = 1e-6
@@ -51,13 +52,18 @@ class Card:
 
 
 def card_of(
-    found: Findings, capsules: dict[str, list[Capsule]], joined: list[tuple[str, str]], remark: str | None
+    found: Findings,
+    capsules: Mapping[str, Sequence[Capsule]],
+    solid: Mapping[str, Sequence[Surface]],
+    joined: list[tuple[str, str]],
+    remark: str | None,
 ) -> Card:
     """The card of an arm.
 
     Args:
         found: What its file holds.
         capsules: Part to where its contacts are looked for.
+        solid: Part to what of it can touch.
         joined: Pairs of parts that overlap in most postures.
         remark: Something else that is left out.
     """
@@ -78,7 +84,7 @@ def card_of(
         sources=found.limits.sources,
         assumed=found.limits.assumed,
         left_out=(*_left_out(found, joined), *([remark] if remark else [])),
-        lacking=tuple(_lacking(found)),
+        lacking=tuple(_lacking(found, solid)),
     )
 
 
@@ -98,7 +104,7 @@ def _left_out(found: Findings, joined: list[tuple[str, str]]) -> Iterator[str]:
         yield "position or velocity servos: every joint has a torque motor instead"
 
 
-def _lacking(found: Findings) -> Iterator[str]:
+def _lacking(found: Findings, solid: Mapping[str, Sequence[Surface]]) -> Iterator[str]:
     model, dofs = found.model, [int(found.model.jnt_dofadr[j]) for j in found.chain.joints]
     if not np.any(found.armature):
         yield (
@@ -107,8 +113,7 @@ def _lacking(found: Findings) -> Iterator[str]:
         )
     if not np.any(model.dof_damping[dofs]) and not np.any(model.dof_frictionloss[dofs]):
         yield "damping and friction of the joints"
-    shaped = set(model.geom_bodyid.tolist())
-    bare = [name for name, link in found.parts.items() if not shaped & set(link.bodies)]
+    bare = [name for name, surfaces in solid.items() if not surfaces and found.parts[name].bodies[0]]
     if bare:
         yield f"shape of {', '.join(bare)}: a capsule of {BARE_RADIUS_M:g} m stands for it"
 

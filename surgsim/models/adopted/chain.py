@@ -49,12 +49,14 @@ def find_chain(model: mujoco.MjModel, robot: "RobotConfig") -> Chain:
     """
     flange_body, p_LF, R_LF = _flange(model, robot.flange)
     way = _way_to(model, flange_body)
-    base = _base(model, way, robot.base_body)
-    above = way[way.index(base) + 1 :]
+    named = _named_base(model, way, robot.base_body)
+    above = way if named is None else way[way.index(named) + 1 :]
     found = [j for body in above for j in range(model.njnt) if model.jnt_bodyid[j] == body]
     joints = found if robot.joints is None else _asked(model, found, robot.joints)
     _check(model, joints)
     links = tuple(int(model.jnt_bodyid[j]) for j in joints)
+    root = _WORLD if links[0] == way[1] else way[1]
+    base = root if named is None else named
     return Chain(base=base, joints=tuple(joints), links=links, flange_body=flange_body, p_LF=p_LF, R_LF=R_LF)
 
 
@@ -115,22 +117,24 @@ def _way_to(model: mujoco.MjModel, body: int) -> list[int]:
     return way[::-1]
 
 
-def _base(model: mujoco.MjModel, way: list[int], name: str | None) -> int:
-    """The body that the base is: the named one, else the last of those that no joint moves from the root."""
+def _named_base(model: mujoco.MjModel, way: list[int], name: str | None) -> int | None:
+    """The body that is named as the base; None if none is.
+
+    Raises:
+        AdoptionError: If it is not on the way, or no joint is.
+    """
     if name is not None:
         base = _id(model, "body", name, "base_body")
         if base not in way:
             raise AdoptionError(f"body '{name}' is not on the way from the root to the flange", "base_body")
         return base
-    moved = [body for body in way if model.body_jntnum[body]]
-    if not moved:
+    if not any(model.body_jntnum[body] for body in way):
         raise AdoptionError(
             f"no joint moves the flange, on body '{model.body(way[-1]).name}'. Joints: "
             f"{listed(model.joint(i).name for i in range(model.njnt))}.",
             "flange",
         )
-    root = way[min(1, len(way) - 1)]
-    return _WORLD if root == moved[0] else root
+    return None
 
 
 def _asked(model: mujoco.MjModel, found: list[int], names: Sequence[str]) -> list[int]:
@@ -160,7 +164,10 @@ def _check(model: mujoco.MjModel, joints: Sequence[int]) -> None:
                 f"joints; others stay where they are",
                 "joints",
             )
-        if np.any(model.jnt_stiffness[joint]):
+        dof = model.jnt_dofadr[joint]
+        if np.any(model.dof_dampingpoly[dof]):
+            raise AdoptionError(f"joint '{name}' has damping that is not linear: not supported", "joints")
+        if np.any(model.jnt_stiffness[joint]) or np.any(model.jnt_stiffnesspoly[joint]):
             raise AdoptionError(
                 f"joint '{name}' has a spring ({float(np.ravel(model.jnt_stiffness[joint])[0]):g} N m/rad): "
                 f"arms with springs are not supported",

@@ -19,7 +19,8 @@ if TYPE_CHECKING:
 
 BARE_RADIUS_M = 0.05
 """Of the capsule of a link that has no shape."""
-_ADAPTER_M, _ADAPTER_RADIUS_M = 0.04, 0.026
+ADAPTER_M, ADAPTER_RADIUS_M = 0.04, 0.026
+"""Of the adapter of the shipped instrument."""
 _CLOUD_M = 0.004
 """Of the points of a surface one is kept in each cube of this size."""
 
@@ -35,7 +36,8 @@ def surfaces_of(found: Findings) -> tuple[dict[str, list[Surface]], dict[str, li
     drawn: dict[str, list[Surface]] = {}
     solid: dict[str, list[Surface]] = {}
     for name, link in found.parts.items():
-        every = [geom for geom in range(model.ngeom) if model.geom_bodyid[geom] in link.bodies]
+        bodies = set(link.bodies) - {0}  # what is fixed to the world is not of the arm
+        every = [geom for geom in range(model.ngeom) if model.geom_bodyid[geom] in bodies]
         hard = [geom for geom in every if model.geom_contype[geom] or model.geom_conaffinity[geom]]
         soft = [geom for geom in every if geom not in hard]
         meshes = [geom for geom in every if model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_MESH]
@@ -128,10 +130,10 @@ def pairs_left_out(
     flange.parent.add_body(name="adapter", pos=flange.pos, quat=flange.quat)
     bodies = {name: name for name in capsules} | {"adapter": "adapter"}
     turn = np.linspace(0.0, 2 * np.pi, 16, endpoint=False)
-    ring = _ADAPTER_RADIUS_M * np.stack([np.cos(turn), np.sin(turn), np.zeros(16)], axis=1)
-    tube = np.concatenate([ring + np.array([0.0, 0.0, z]) for z in np.linspace(0.0, _ADAPTER_M, 5)])
-    ends = np.array([[0.0, 0.0, 0.0], [0.0, 0.0, max(0.0, _ADAPTER_M - _ADAPTER_RADIUS_M)]])
-    adapter = [Capsule(ends=ends, radius=_ADAPTER_RADIUS_M)]
+    ring = ADAPTER_RADIUS_M * np.stack([np.cos(turn), np.sin(turn), np.zeros(16)], axis=1)
+    tube = np.concatenate([ring + np.array([0.0, 0.0, z]) for z in np.linspace(0.0, ADAPTER_M, 5)])
+    ends = np.array([[0.0, 0.0, 0.0], [0.0, 0.0, max(0.0, ADAPTER_M - ADAPTER_RADIUS_M)]])
+    adapter = [Capsule(ends=ends, radius=ADAPTER_RADIUS_M)]
     return never_touch(
         spec.compile(),
         bodies,

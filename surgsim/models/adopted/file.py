@@ -3,14 +3,13 @@
 import hashlib
 import os
 import xml.etree.ElementTree as ET
-from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
 import mujoco
 
-from surgsim.models.adopted.problem import AdoptionError, listed
+from surgsim.models.adopted.problem import AdoptionError
 from surgsim.models.adopted.urdf import read_urdf
 
 Kind = Literal["mjcf", "urdf"]
@@ -70,12 +69,13 @@ def read_file(path: Path, kind: Kind) -> ModelFile:
     else:
         _check_mjcf(path)
         spec = _parsed(path, kind, None)
-        velocity, effort, undrawn = {}, {}, _without_lost_meshes(spec)
+        velocity, effort, undrawn = {}, {}, ()
         spec.compiler.fusestatic, spec.compiler.discardvisual = False, False
     try:
-        model = spec.compile()
+        model, lost = _compiled(spec)
     except ValueError as error:
         raise AdoptionError(f"MuJoCo cannot compile {path}: {_first_line(error)}", kind) from error
+    undrawn = (*undrawn, *lost)
     return ModelFile(path=path, kind=kind, model=model, velocity=velocity, effort=effort, undrawn=undrawn)
 
 
@@ -120,44 +120,55 @@ def _check_mjcf(path: Path) -> None:
 
 
 def _named_by(path: Path) -> list[Path]:
-    """The files that an MJCF includes, and the meshes that it and they name, as far as they are there."""
+    """The files that an MJCF includes or attaches, and the meshes that they name, where they are there."""
     _check_mjcf(path)
-    trees, included = [ET.parse(path).getroot()], []
+    trees, named, attached = [ET.parse(path).getroot()], [], []
     for tree in trees:
         for element in tree.iter("include"):
             file = path.parent / element.get("file", "")
-            if file.is_file() and file not in included:
-                included.append(file)
+            if file.is_file() and file not in named:
+                named.append(file)
                 trees.append(ET.parse(file).getroot())
+        attached += [path.parent / model.get("file", "") for model in tree.iter("model") if model.get("file")]
     compilers = [compiler for tree in trees for compiler in tree.iter("compiler")]
-    folders = [path.parent / (c.get("meshdir") or c.get("assetdir") or "") for c in compilers] or [
-        path.parent
-    ]
+    folders = [path.parent / (c.get("meshdir") or c.get("assetdir") or "") for c in compilers]
     meshes = [mesh.get("file") for tree in trees for mesh in tree.iter("mesh")]
-    places = (folder / mesh for folder in folders for mesh in meshes if mesh)
-    return [*included, *(place for place in places if place.is_file())]
+    places = (folder / mesh for folder in folders or [path.parent] for mesh in meshes if mesh)
+    named += [place for place in places if place.is_file()]
+    for model in attached:
+        if model.is_file() and model not in named:
+            named += [model, *_named_by(model)]
+    return named
 
 
-def _mesh_files(spec: mujoco.MjSpec) -> list[Path]:
-    folder = Path(spec.modelfiledir) / spec.meshdir
-    return [folder / mesh.file for mesh in spec.meshes if mesh.file]
+def _compiled(spec: mujoco.MjSpec) -> tuple[mujoco.MjModel, tuple[str, ...]]:
+    """The compiled model; where that fails for meshes that are not there, without them, and their files.
+
+    Raises:
+        ValueError: If MuJoCo cannot compile it.
+        AdoptionError: If a body's mass would be worked out from a mesh that is not there.
+    """
+    try:
+        return spec.copy().compile(), ()
+    except ValueError:
+        undrawn = _without_lost_meshes(spec)
+        if not undrawn:
+            raise
+    return spec.compile(), undrawn
 
 
 def _without_lost_meshes(spec: mujoco.MjSpec) -> tuple[str, ...]:
-    """Take meshes away whose files are not there, and what is drawn with them; their files.
-
-    Raises:
-        AdoptionError: If a link's mass would be worked out from one.
-    """
-    files = {mesh.name: file for mesh, file in zip(_with_file(spec), _mesh_files(spec), strict=True)}
+    """Take meshes away whose files are not there, and what is drawn with them; their files."""
+    folder = Path(spec.modelfiledir) / spec.meshdir
+    files = {mesh.name: folder / mesh.file for mesh in spec.meshes if mesh.file}
     lost = {name: file for name, file in files.items() if not file.is_file()}
     for geom in list(spec.geoms):
         if geom.meshname in lost:
             body = geom.parent
-            if not body.explicitinertial and body.name != "world" and body.joints:
+            if not body.explicitinertial and body.name != "world" and geom.mass != 0.0:
                 raise AdoptionError(
-                    f"the mesh {lost[geom.meshname]} is not there, and the mass of body '{body.name}' is to "
-                    f"be worked out from it",
+                    f"the mesh {lost[geom.meshname]} is not there, and the mass of body '{body.name}' comes "
+                    f"from its geom",
                     "mjcf",
                 )
             spec.delete(geom)
@@ -167,15 +178,6 @@ def _without_lost_meshes(spec: mujoco.MjSpec) -> tuple[str, ...]:
     return tuple(os.path.relpath(file, spec.modelfiledir or ".") for file in lost.values())
 
 
-def _with_file(spec: mujoco.MjSpec) -> Iterable[mujoco.MjsMesh]:
-    return (mesh for mesh in spec.meshes if mesh.file)
-
-
 def _first_line(error: Exception) -> str:
     lines = [line.strip() for line in str(error).splitlines() if line.strip()]
     return "; ".join(lines[:2]) if lines else type(error).__name__
-
-
-def joints_named(model: mujoco.MjModel) -> str:
-    """The joints of a model, for a message."""
-    return listed(model.joint(i).name for i in range(model.njnt))

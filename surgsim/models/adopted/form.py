@@ -27,7 +27,7 @@ def mechanics_of(found: Findings, home: Array | None) -> mujoco.MjSpec:
         if above is not None:
             body.pos = above.R_WL.T @ (link.p_WL - above.p_WL)
             body.quat = quaternion(above.R_WL.T @ link.R_WL)
-        set_inertia(body, link.mass, link.com, link.inertia)
+        set_inertia(body, link.mass, link.com, link.inertia, link.R_LI)
         if i > 0:
             _add_joint(body, found, i - 1)
         above = link
@@ -48,12 +48,12 @@ def mechanics_of(found: Findings, home: Array | None) -> mujoco.MjSpec:
     return spec
 
 
-def set_inertia(body: mujoco.MjsBody, mass: float, com: Array, inertia: Array) -> None:
-    """Give a body its mass [kg], and inertia (3, 3) [kg m²] about its centre of mass (3,) [m]."""
+def set_inertia(body: mujoco.MjsBody, mass: float, com: Array, inertia: Array, axes: Array) -> None:
+    """Give a body its mass [kg], centre of mass (3,) [m], and moments (3,) [kg m²] along `axes` (3, 3)."""
     body.explicitinertial = True
     body.mass, body.ipos = mass, com
     if mass > 0.0:
-        body.fullinertia = [inertia[i] for i in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))]
+        body.inertia, body.iquat = inertia, quaternion(axes)
 
 
 def _add_joint(body: mujoco.MjsBody, found: Findings, i: int) -> None:

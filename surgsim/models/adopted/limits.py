@@ -19,6 +19,7 @@ ASSUMED_ACCELERATION_RAD_PER_S2 = 5.23599
 """300 deg/s², as is used for arms whose makers publish none."""
 TURN_RAD = 6.28318
 """How far either way a joint without limits is let turn: one turn."""
+_ON_JOINTS = (mujoco.mjtTrn.mjTRN_JOINT, mujoco.mjtTrn.mjTRN_JOINTINPARENT)  # the same for a hinge
 _VELOCITY, _ACCELERATION = "velocity_limit_rad_per_s", "acceleration_limit_rad_per_s2"
 
 
@@ -50,7 +51,7 @@ def find_limits(file: ModelFile, chain: Chain, robot: "RobotConfig") -> Limits:
         AdoptionError: If a joint has no torque limit anywhere, or a list has not one number for each joint.
     """
     model, given = file.model, robot.limits
-    names = [model.joint(j).name for j in chain.joints]
+    names = [model.joint(j).name or f"number {j}" for j in chain.joints]
     sources: dict[str, str] = {"position": "the file"}
     assumed: list[str] = []
 
@@ -77,8 +78,9 @@ def find_limits(file: ModelFile, chain: Chain, robot: "RobotConfig") -> Limits:
     lacking = [name for name, value in zip(names, torque, strict=True) if not np.isfinite(value)]
     if lacking:
         raise AdoptionError(
-            f"no torque limit of joint {listed(lacking)} in the file: no motor with ctrlrange, no "
-            f"forcerange, actuatorfrcrange or effort. Give limits: {{torque_nm: [{len(names)} numbers]}}.",
+            f"no torque limit of joint {listed(lacking)} in the file: no motor with a "
+            f"ctrlrange both ways, no forcerange, actuatorfrcrange or effort. Give limits: "
+            f"{{torque_nm: [{len(names)} numbers]}}.",
             "limits",
         )
     return Limits(
@@ -151,8 +153,8 @@ def _torques(file: ModelFile, chain: Chain, names: list[str]) -> Array:
         if model.jnt_actfrclimited[joint]:
             torques[i] = min(torques[i], _either_way(model.jnt_actfrcrange[joint]))
         for actuator in range(model.nu):
-            kind = model.actuator_trntype[actuator]
-            if kind == mujoco.mjtTrn.mjTRN_JOINT and model.actuator_trnid[actuator, 0] == joint:
+            kind = int(model.actuator_trntype[actuator])
+            if kind in _ON_JOINTS and model.actuator_trnid[actuator, 0] == joint:
                 torques[i] = min(torques[i], _torque_of(model, actuator))
     return np.where(torques > 0.0, torques, np.inf)
 

@@ -10,6 +10,7 @@ from surgsim.models.adopted.chain import Chain
 from surgsim.spatial import Array
 
 _WORLD = 0
+_ROUNDING = 1e-9
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -22,7 +23,8 @@ class Link:
         R_WL: Axes of its frame there (3, 3).
         mass: [kg].
         com: Centre of mass in its frame (3,) [m].
-        inertia: About the centre of mass, along its axes (3, 3) [kg m²].
+        inertia: Principal moments about the centre of mass (3,) [kg m²].
+        R_LI: Their axes in its frame (3, 3).
     """
 
     bodies: tuple[int, ...]
@@ -31,6 +33,7 @@ class Link:
     mass: float
     com: Array
     inertia: Array
+    R_LI: Array
 
     def to(self, p_W: Array) -> Array:
         """A place (3,) [m], joints at their zero, in this frame."""
@@ -122,18 +125,27 @@ def _link(model: mujoco.MjModel, data: mujoco.MjData, bodies: tuple[int, ...]) -
     masses = model.body_mass[list(bodies)]
     mass = float(masses.sum())
     if len(bodies) == 1 or mass == 0.0 or masses[0] == mass:  # as it is, to the last bit
-        com, turn = model.body_ipos[own].copy(), _matrix(model.body_iquat[own])
-        inertia = turn @ np.diag(model.body_inertia[own]) @ turn.T
-        return Link(bodies=bodies, p_WL=p_WL, R_WL=R_WL, mass=mass, com=com, inertia=inertia)
+        com, turn = model.body_ipos[own].copy(), matrix(model.body_iquat[own])
+        moments = model.body_inertia[own].copy()
+        return Link(bodies=bodies, p_WL=p_WL, R_WL=R_WL, mass=mass, com=com, inertia=moments, R_LI=turn)
     com_W, inertia_W = inertia_together(model, data, bodies)
-    return Link(
-        bodies=bodies,
-        p_WL=p_WL,
-        R_WL=R_WL,
-        mass=mass,
-        com=R_WL.T @ (com_W - p_WL),
-        inertia=R_WL.T @ inertia_W @ R_WL,
-    )
+    moments, turn = principal(R_WL.T @ inertia_W @ R_WL)
+    com = R_WL.T @ (com_W - p_WL)
+    return Link(bodies=bodies, p_WL=p_WL, R_WL=R_WL, mass=mass, com=com, inertia=moments, R_LI=turn)
+
+
+def principal(inertia: Array) -> tuple[Array, Array]:
+    """Principal moments (3,) and their axes (3, 3) of an inertia (3, 3).
+
+    A sum that breaks A + B >= C by rounding is lifted until it holds.
+    """
+    moments, axes = np.linalg.eigh(0.5 * (inertia + inertia.T))
+    if np.linalg.det(axes) < 0.0:
+        axes[:, 0] *= -1.0
+    lack = float(moments[2] - moments[0] - moments[1])
+    if 0.0 < lack < _ROUNDING * moments[2]:
+        moments[:2] += lack
+    return moments, axes
 
 
 def inertia_together(
@@ -150,7 +162,8 @@ def inertia_together(
     return com, inertia
 
 
-def _matrix(quaternion: Array) -> Array:
+def matrix(quaternion: Array) -> Array:
+    """Axes (3, 3) of a quaternion wxyz (4,)."""
     turn = np.zeros(9)
     mujoco.mju_quat2Mat(turn, quaternion)
     return turn.reshape(3, 3)

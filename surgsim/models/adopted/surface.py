@@ -12,6 +12,7 @@ from surgsim.spatial import Array
 SPACING_M = 0.01
 """Greatest distance of the points that stand for a surface."""
 _AROUND = 16
+_NO_COLOUR = np.array([0.5, 0.5, 0.5, 1.0], dtype=np.float32)  # what MuJoCo gives a geom without one
 _MOST_CUTS = 200  # of an edge
 
 
@@ -57,7 +58,7 @@ def surface_of(
         p_WL: Place of the link's frame there (3,) [m].
         R_WL: Its axes there (3, 3).
     """
-    kind = model.geom_type[geom]
+    kind = int(model.geom_type[geom])  # NumPy's own integer is in no tuple of MuJoCo's kinds
     if kind == mujoco.mjtGeom.mjGEOM_MESH:
         mesh = int(model.geom_dataid[geom])
         start, count = model.mesh_vertadr[mesh], model.mesh_vertnum[mesh]
@@ -71,8 +72,9 @@ def surface_of(
         triangles = hull(points)
     turn, place = data.geom_xmat[geom].reshape(3, 3), data.geom_xpos[geom]
     points = (points @ turn.T + place - p_WL) @ R_WL
-    material = model.geom_matid[geom]
-    rgba = model.geom_rgba[geom] if material < 0 else model.mat_rgba[material]
+    material, rgba = model.geom_matid[geom], model.geom_rgba[geom]
+    if material >= 0 and np.all(rgba == _NO_COLOUR):  # a colour of its own counts before the material's
+        rgba = model.mat_rgba[material]
     return Surface(points=points, faces=triangles, rgba=np.array(rgba, dtype=float))
 
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from surgsim.models.adopted.file import read_file
 from surgsim.models.adopted.form import draw, quaternion, set_inertia
-from surgsim.models.adopted.links import inertia_together
+from surgsim.models.adopted.links import inertia_together, principal
 from surgsim.models.adopted.problem import AdoptionError, listed
 from surgsim.models.adopted.surface import Surface, coarser, surface_of
 from surgsim.spatial import Array
@@ -34,7 +34,8 @@ class Tool:
         shaft_length_m: From there to the tip.
         mass: [kg].
         com: Centre of mass in its frame (3,) [m].
-        inertia: About the centre of mass, along its axes (3, 3) [kg m²].
+        inertia: Principal moments about the centre of mass (3,) [kg m²].
+        R_TI: Their axes in its frame (3, 3).
         surfaces: What is drawn.
     """
 
@@ -45,6 +46,7 @@ class Tool:
     mass: float
     com: Array
     inertia: Array
+    R_TI: Array
     surfaces: tuple[Surface, ...]
 
 
@@ -71,7 +73,7 @@ def read_tool(path: Path, entry_site: str, tip_site: str, files_sha256: str) -> 
     root = 1
     bodies = [body for body in range(1, model.nbody) if model.body_rootid[body] == root]
     entry, tip = (
-        data.site_xpos[_site(model, name, key)]
+        data.site_xpos[_site(model, bodies, name, key)]
         for name, key in ((entry_site, "shaft_entry_site"), (tip_site, "tip_site"))
     )
     length = float(np.linalg.norm(tip - entry))
@@ -87,6 +89,7 @@ def read_tool(path: Path, entry_site: str, tip_site: str, files_sha256: str) -> 
     adapter = max(0.0, float((entry - p_WE) @ axis))
     origin, R_WT = entry - adapter * axis, _axes(axis, R_WE)
     com, inertia = inertia_together(model, data, bodies)
+    moments, turn = principal(R_WT.T @ inertia @ R_WT)
     geoms = [g for g in range(model.ngeom) if model.geom_bodyid[g] in bodies and model.geom_rgba[g][3] > 0.0]
     surfaces = (surface_of(model, data, geom, origin, R_WT) for geom in geoms)
     return Tool(
@@ -96,7 +99,8 @@ def read_tool(path: Path, entry_site: str, tip_site: str, files_sha256: str) -> 
         shaft_length_m=length,
         mass=float(model.body_mass[bodies].sum()),
         com=R_WT.T @ (com - origin),
-        inertia=R_WT.T @ inertia @ R_WT,
+        inertia=moments,
+        R_TI=turn,
         surfaces=tuple(s for s in surfaces if s is not None and len(s.faces)),
     )
 
@@ -110,11 +114,12 @@ def _axes(z: Array, like: Array) -> Array:
     return np.stack([x, np.cross(z, x), z], axis=1)
 
 
-def _site(model: mujoco.MjModel, name: str, key: str) -> int:
+def _site(model: mujoco.MjModel, bodies: list[int], name: str, key: str) -> int:
+    """Id of a site on one of `bodies`."""
     found = int(mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_SITE, name))
-    if found < 0:
-        known = listed(model.site(i).name for i in range(model.nsite))
-        raise AdoptionError(f"the file has no site '{name}'. Sites: {known}.", key)
+    if found < 0 or model.site_bodyid[found] not in bodies:
+        known = listed(model.site(i).name for i in range(model.nsite) if model.site_bodyid[i] in bodies)
+        raise AdoptionError(f"the instrument has no site '{name}'. Sites: {known}.", key)
     return found
 
 
@@ -125,7 +130,7 @@ def tool_spec(tool: Tool) -> mujoco.MjSpec:
     spec.compiler.degree = False
     spec.compiler.balanceinertia = False
     body = spec.worldbody.add_body(name="instrument", pos=tool.p_ET, quat=quaternion(tool.R_ET))
-    set_inertia(body, tool.mass, tool.com, tool.inertia)
+    set_inertia(body, tool.mass, tool.com, tool.inertia, tool.R_TI)
     entry, tip = tool.adapter_length_m, tool.adapter_length_m + tool.shaft_length_m
     body.add_site(name="shaft_entry", pos=[0.0, 0.0, entry], group=4)
     body.add_site(name="tip", pos=[0.0, 0.0, tip], group=4)

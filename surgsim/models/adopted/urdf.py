@@ -74,27 +74,40 @@ def _limits(root: ET.Element) -> Iterator[tuple[str, tuple[float, float]]]:
     """Name, largest speed [rad/s] and torque [N m] of every joint; 0 where there is none."""
     for joint in root.findall("joint"):
         limit = joint.find("limit")
-        values = (0.0, 0.0) if limit is None else (_number(limit, "velocity"), _number(limit, "effort"))
-        yield joint.get("name", ""), values
+        name = joint.get("name", "")
+        values = (0.0, 0.0)
+        if limit is not None:
+            values = _number(name, limit, "velocity"), _number(name, limit, "effort")
+        yield name, values
 
 
-def _number(element: ET.Element, key: str) -> float:
+def _number(joint: str, element: ET.Element, key: str) -> float:
+    """A limit; 0 where there is none.
+
+    Raises:
+        AdoptionError: If it is no finite number, or below 0.
+    """
+    text = element.get(key, "0")
     try:
-        value = float(element.get(key, "0"))
+        value = float(text)
     except ValueError:
-        return 0.0
-    return value if math.isfinite(value) else 0.0
+        value = math.nan
+    if not (math.isfinite(value) and value >= 0.0):
+        raise AdoptionError(f"joint '{joint}': {key}=\"{text}\" is no limit: a number, 0 or more", "urdf")
+    return value
 
 
 def _find_meshes(root: ET.Element, path: Path) -> tuple[tuple[Path, ...], tuple[str, ...]]:
     """Give every mesh its whole path, and take shapes away whose mesh cannot be read."""
+    compiler = root.find("mujoco/compiler")
+    folder = "" if compiler is None else compiler.get("meshdir", "")
     used: list[Path] = []
     undrawn: list[str] = []
     for link in root.findall("link"):
         for shape in [*link.findall("visual"), *link.findall("collision")]:
             for mesh in shape.iter("mesh"):
                 name = mesh.get("filename", "")
-                found = _place(name, path)
+                found = _place(name, path, folder)
                 if found is None or found.suffix.lower() not in _KNOWN_MESHES:
                     link.remove(shape)
                     undrawn.append(name)
@@ -104,14 +117,16 @@ def _find_meshes(root: ET.Element, path: Path) -> tuple[tuple[Path, ...], tuple[
     return tuple(sorted(set(used))), tuple(dict.fromkeys(undrawn))
 
 
-def _place(name: str, path: Path) -> Path | None:
-    """Where a mesh is: `package://` is looked for in and beside the folders above the file."""
+def _place(name: str, path: Path, folder: str) -> Path | None:
+    """Where a mesh is: in the file's folder, its `folder`, or of `package://` beside those above it."""
     if not name.startswith(_PACKAGE):
-        place = path.parent / name.removeprefix("file://")
-        return place.resolve() if place.is_file() else None
+        for place in (path.parent / name.removeprefix("file://"), path.parent / folder / name):
+            if place.is_file():
+                return place.resolve()
+        return None
     package, _, rest = name.removeprefix(_PACKAGE).partition("/")
-    for folder in path.resolve().parents:
-        for inside in (folder / package / rest, folder / rest):
+    for above in path.resolve().parents:
+        for inside in (above / package / rest, above / rest):
             if inside.is_file() and package in inside.parts:
                 return inside
     return None
@@ -119,8 +134,10 @@ def _place(name: str, path: Path) -> Path | None:
 
 def _keep_bodies_apart(root: ET.Element) -> None:
     """Ask MuJoCo to keep links on fixed joints, drawn shapes and whole paths."""
-    for old in root.findall("mujoco"):
-        root.remove(old)
-    compiler = ET.SubElement(ET.SubElement(root, "mujoco"), "compiler")
+    block = root.find("mujoco")
+    block = ET.SubElement(root, "mujoco") if block is None else block
+    compiler = block.find("compiler")
+    compiler = ET.SubElement(block, "compiler") if compiler is None else compiler
+    compiler.attrib.pop("meshdir", None)  # meshes have whole paths by now
     for key, value in {"strippath": "false", "fusestatic": "false", "discardvisual": "false"}.items():
         compiler.set(key, value)

@@ -1,5 +1,6 @@
 """An arm from a file as a robot's folder: its MJCF with every digit, and its meshes."""
 
+import re
 import struct
 import xml.etree.ElementTree as ET
 from collections.abc import Iterable, Sequence
@@ -27,7 +28,7 @@ def mjcf_text(
         remarks: Lines that stand at the top.
     """
     root = ET.Element("mujoco", model=name)
-    root.append(ET.Comment("\n" + "".join(f"    {line.replace('--', '- -')}\n" for line in remarks) + "  "))
+    root.append(ET.Comment("\n" + "".join(f"    {re.sub('--+', '-', line)}\n" for line in remarks) + "  "))
     ET.SubElement(root, "compiler", angle="radian", autolimits="true", meshdir=MESHES)
     custom = ET.SubElement(root, "custom")
     for text in spec.texts:
@@ -68,7 +69,8 @@ def _write_bodies(
     for body in bodies:
         element = ET.SubElement(parent, "body", name=body.name, pos=_row(body.pos), quat=_row(body.quat))
         if body.mass > 0.0:
-            inertial = {"pos": body.ipos, "mass": [body.mass], "fullinertia": body.fullinertia}
+            where = {"pos": body.ipos, "quat": body.iquat}
+            inertial = {**where, "mass": [body.mass], "diaginertia": body.inertia}
             ET.SubElement(element, "inertial", {key: _row(value) for key, value in inertial.items()})
         for joint in body.joints:
             _write_joint(element, joint)
