@@ -8,7 +8,7 @@ from pathlib import Path
 
 from surgsim.adopt.picture import port_picture
 from surgsim.adopt.ports import DEPTH_M, RADIUS_M, PortMap, circle_through, map_ports
-from surgsim.errors import Outcome, SurgsimError
+from surgsim.errors import SurgsimError
 from surgsim.models.adopted.arm import adopted
 from surgsim.models.adopted.card import Card
 from surgsim.models.adopted.written import model_files
@@ -19,6 +19,7 @@ from surgsim.runs.drafts import draft_of
 from surgsim.runs.exchange import put_in_place
 from surgsim.runs.folder import RunResult, execute
 
+_ASKEW_DEG = 45.0
 CARD, MAP, MANIFEST = "README.md", "ports.png", "robot.json"
 
 
@@ -41,7 +42,8 @@ class Trial:
         place = ", ".join(f"{x:.2f}" for x in self.port_m)
         tip, rcm = metrics["tip_error_max_mm"], metrics["rcm_error_max_mm"]
         errors = "" if tip is None or rcm is None else f"; tip at most {tip:.3g} mm off, shaft {rcm:.3g} mm"
-        return f"circle through a port at ({place}) m: {ending.outcome.name.lower()}{errors}"
+        done = "done" if self.result.verdict.success else f"NOT done, {self.result.verdict.reason}"
+        return f"circle through a port at ({place}) m: {ending.outcome.name.lower()}, {done}{errors}"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -64,8 +66,8 @@ class Adoption:
 
     @property
     def works(self) -> bool:
-        """Whether a circle was followed to its end."""
-        return self.trial is not None and self.trial.result.trace.meta.ending.outcome is Outcome.COMPLETED
+        """Whether a circle was followed, by the thresholds of any run."""
+        return self.trial is not None and bool(self.trial.result.verdict.success)
 
 
 def adopt(
@@ -168,6 +170,7 @@ def card_rows(adoption: Adoption) -> list[tuple[str, str]]:
         ("joints", f"{len(card.joints)}: {', '.join(card.joints)}"),
         ("links", ", ".join(card.links)),
         ("redundancy", f"{card.redundancy} with tip and shaft held{_roll(card)}"),
+        ("flange", _flange(card)),
         ("mass", f"{card.mass_kg:.2f} kg without the base"),
         ("reach", f"{card.reach_m:.3f} m from the second joint to the flange, stretched"),
         ("collisions", f"looked for between {card.capsules} capsules"),
@@ -179,14 +182,29 @@ def card_rows(adoption: Adoption) -> list[tuple[str, str]]:
     if ports is not None:
         tried = ports.margin_rad.size
         rows.append(("ports", f"{ports.reached} of {tried} upright ones in front of the base can be used"))
-        rows += [("no port", f"{count} times: {reason}") for reason, count in _most(ports.reasons)]
+        rows += [("no port", f"{times}: {reason}") for reason, times in _most(ports.reasons)]
     if adoption.trial is not None:
         rows.append(("check", adoption.trial.told))
     return rows
 
 
-def _most(reasons: dict[str, int], most: int = 3) -> Sequence[tuple[str, int]]:
-    return sorted(reasons.items(), key=lambda item: -item[1])[:most]
+def _most(reasons: dict[str, int], most: int = 3) -> Sequence[tuple[str, str]]:
+    """Reasons and how often, the rarer ones together."""
+    ranked = sorted(reasons.items(), key=lambda item: -item[1])
+    rest = sum(count for _, count in ranked[most:])
+    told = [(reason, _times(count)) for reason, count in ranked[:most]]
+    return [*told, ("another reason", _times(rest))] if rest else told
+
+
+def _times(count: int) -> str:
+    return "once" if count == 1 else f"{count} times"
+
+
+def _flange(card: Card) -> str:
+    angle = (
+        f"its z, along which the shaft goes, is {card.flange_turn_deg:.0f} degrees from the last joint's axis"
+    )
+    return angle if card.flange_turn_deg < _ASKEW_DEG else f"{angle}: is it the axis that is meant?"
 
 
 def _roll(card: Card) -> str:

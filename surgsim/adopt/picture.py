@@ -15,10 +15,11 @@ def port_picture(ports: PortMap, name: str) -> bytes:
     figure = Figure(figsize=(7.0, 5.2), layout="constrained")
     axes = figure.add_subplot()
     margin = np.rad2deg(ports.margin_rad)
-    shown = axes.pcolormesh(ports.x_m, ports.z_m, margin, cmap="viridis", vmin=0.0)
-    figure.colorbar(shown, label="smallest distance of a joint from its limit [deg]")
+    if ports.reached:
+        shown = axes.pcolormesh(ports.x_m, ports.z_m, margin, cmap="viridis", vmin=0.0)
+        figure.colorbar(shown, label="smallest distance of a joint from its limit [deg]")
     row, column = np.where(~np.isfinite(margin))
-    axes.plot(ports.x_m[column], ports.z_m[row], "x", color="#9a3b3b", label="cannot be reached")
+    axes.plot(ports.x_m[column], ports.z_m[row], "x", color="#9a3b3b", label="cannot be used")
     if (best := ports.best_m) is not None:
         axes.plot(*best, "o", mfc="none", mec="white", mew=2.5, ms=14)
         axes.plot(*best, "o", mfc="none", mec="black", mew=1.0, ms=14, label="most room")

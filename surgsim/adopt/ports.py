@@ -110,5 +110,7 @@ def _margin(scenario: Scenario) -> float:
 
 
 def _kind(text: str) -> str:
-    """What in a refusal says why: what stands in its last brackets."""
-    return text[text.rfind("(") + 1 :].rstrip(")") if "(" in text else text
+    """What in a refusal says why, without its place and its depth."""
+    if "contact" in text or "touch" in text:
+        return "the arm would touch itself or the patient"
+    return text[text.rfind("(") + 1 :].rstrip(")") if "(" in text else text.partition(": ")[2] or text

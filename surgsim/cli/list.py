@@ -2,6 +2,7 @@
 
 import argparse
 import json
+from collections.abc import Callable
 
 HELP = "list what a scenario can name"
 EXAMPLES = """examples:
@@ -44,6 +45,16 @@ def execute(options: argparse.Namespace) -> int:
     return 0
 
 
+def _described(describe: Callable[[str], str], name: str) -> str:
+    """A line about a part, or why there is none."""
+    from surgsim.errors import SurgsimError
+
+    try:
+        return describe(name)
+    except SurgsimError as error:
+        return f"cannot be used: {error}"
+
+
 def items_of(kind: str) -> list[tuple[str, str]]:
     """Names of one of `KINDS`, each with a line about it."""
     if kind in ("scenarios", "suites", "controllers"):
@@ -52,7 +63,7 @@ def items_of(kind: str) -> list[tuple[str, str]]:
         from surgsim.models.folders import robot_names
         from surgsim.models.robot import robot_description
 
-        return [(name, robot_description(name)) for name in robot_names()]
+        return [(name, _described(robot_description, name)) for name in robot_names()]
     if kind == "policies":
         from surgsim.control.policies.registry import policy_names, policy_summary
 

@@ -59,8 +59,15 @@ def known_robot(name: str) -> str:
     """
     if name not in (*robot_names(), *arms_for_tests()):
         hint = " A file is given as mjcf or urdf." if Path(name).suffix in (".xml", ".urdf", ".mjcf") else ""
-        raise ValueError(unknown_name(name, "robot", robot_names()) + hint)
+        raise ValueError(unknown_name(name, "robot", robot_names()) + hint + _lost())
     return name
+
+
+def _lost() -> str:
+    """Which folders of the search path are not there."""
+    folders = [folder for folder in os.environ.get(SEARCH_PATH, "").split(os.pathsep) if folder]
+    lost = [folder for folder in folders if not Path(folder).is_dir()]
+    return f" {SEARCH_PATH} lists {', '.join(lost)}, which is no folder." if lost else ""
 
 
 def robot_file(name: str) -> Path:

@@ -99,6 +99,40 @@ def test_what_it_cannot_write_over_it_leaves(tmp_path, named, capsys):
     assert [file.name for file in (named / "their_arm").iterdir()] == ["notes.txt"]
 
 
+def test_an_edited_folder_is_not_written_over(tmp_path, named, capsys):
+    _adopted(tmp_path, named, "--name", "their_arm")
+    again = ["adopt", str(tmp_path / "arm.xml"), "--set", "base_body=pedestal", "--set", JOINTS]
+    again += ["--out", str(named), "--quick", "--name", "their_arm"]
+    assert main(again) == 0
+    file = named / "their_arm" / "their_arm.xml"
+    file.write_text(file.read_text().replace("3.14159", "2.5"))
+    edited = file.read_text()
+    assert main(again) == 2
+    assert "was edited since it was written" in capsys.readouterr().err
+    assert file.read_text() == edited
+
+
+def test_a_folder_of_somebody_elses_is_left_alone(tmp_path, capsys):
+    source = write_mjcf(tmp_path)
+    (tmp_path / "arm").mkdir()
+    source.rename(tmp_path / "arm" / "arm.xml")
+    (tmp_path / "meshes").rename(tmp_path / "arm" / "meshes")
+    (tmp_path / "arm" / "LICENSE").write_text("theirs")
+    before = (tmp_path / "arm" / "arm.xml").read_text()
+    words = ["adopt", str(tmp_path / "arm" / "arm.xml"), "--set", "base_body=pedestal", "--set", JOINTS]
+    assert main([*words, "--out", str(tmp_path), "--quick"]) == 2
+    assert "was not written by surgsim adopt" in capsys.readouterr().err
+    assert (tmp_path / "arm" / "arm.xml").read_text() == before
+    assert (tmp_path / "arm" / "LICENSE").is_file()
+
+
+def test_the_card_asks_whether_a_flange_askew_is_meant(tmp_path, named, capsys):
+    path = write_urdf(tmp_path)
+    path.write_text(path.read_text().replace('rpy="0 0 0.3"', 'rpy="0 1.5708 0"'))
+    assert main(["adopt", str(path), "--out", str(named), "--quick"]) == 0
+    assert "is 90 degrees from" in " ".join(capsys.readouterr().out.split())
+
+
 @pytest.mark.parametrize("name", ["lwr4plus", "Their Arm"])
 def test_names_that_cannot_be_are_refused(tmp_path, named, capsys, name):
     assert _adopted(tmp_path, named, "--name", name) == 2

@@ -30,6 +30,7 @@ class Card:
         mass_kg: Of the links, without the base.
         reach_m: From the first joint's axis to the flange, arm stretched as far as its lengths allow [m].
         rolls_shaft: Whether the last joint turns about the tool's axis.
+        flange_turn_deg: Angle between the flange's z and the axis of the last joint [deg].
         redundancy: Degrees of freedom left when the tip and, through a port, the shaft are held.
         capsules: How many there are.
         sources: What is limited to where the numbers are from.
@@ -43,6 +44,7 @@ class Card:
     mass_kg: float
     reach_m: float
     rolls_shaft: bool
+    flange_turn_deg: float
     redundancy: int
     capsules: int
     sources: Mapping[str, str] = field(default_factory=dict)
@@ -79,6 +81,7 @@ def card_of(
         mass_kg=sum(link.mass for link in found.links.links),
         reach_m=_reach(found.parts, p),
         rolls_shaft=rolls,
+        flange_turn_deg=float(np.rad2deg(np.arccos(np.clip(abs(R[:, 2] @ axis), 0.0, 1.0)))),
         redundancy=n - _HELD - rolls,
         capsules=sum(map(len, capsules.values())),
         sources=found.limits.sources,
@@ -92,8 +95,8 @@ def _left_out(found: Findings, joined: list[tuple[str, str]]) -> Iterator[str]:
     model, undrawn = found.model, found.file.undrawn
     for name, mass in found.links.left_out.items():
         yield f"hand '{name}' with joints of its own, {mass:.3g} kg"
-    for name in found.links.welded:
-        yield f"joint '{name}', which stays at its zero"
+    if welded := found.links.welded:
+        yield f"other joints, which stay at their zero: {listed(welded, most=4)}"
     if undrawn:
         yield f"meshes that are not there or of an unknown kind: {listed(undrawn, most=2)}"
     for one, other in joined:

@@ -117,7 +117,7 @@ def test_the_card_says_what_was_assumed_and_left_out(mjcf):
     assert any("'A6'" in line for line in card.assumed)  # its range
     assert any("velocity limit of every joint" in line for line in card.assumed)
     left_out = " ".join(card.left_out)
-    for word in ("hand 'hand'", "joint 'pan'", "not_there.stl", "servos"):
+    for word in ("hand 'hand'", "'pan'", "not_there.stl", "servos"):
         assert word in left_out
 
 
@@ -260,3 +260,73 @@ def test_capsules_may_be_listed_by_the_files_bodies(mjcf):
     assert "'table' is no body of the arm" in _refused(
         mjcf=str(mjcf), base_body="pedestal", joints=NAMES, collision=wrong
     )
+
+
+THEIRS = {"base_body": "pedestal", "joints": NAMES}
+
+
+def test_every_kind_of_shape_is_seen_and_held_by_its_capsule(mjcf):
+    """Capsules and spheres of the file come out as the capsules that they are."""
+    arm = adopted(RobotConfig(mjcf=str(mjcf), **THEIRS))
+    assert all(arm.surfaces[name] for name in ("base", *(f"link{i}" for i in range(1, 8))))
+    assert not any("capsule of" in line for line in arm.card.lacking)
+    shapes = _scene(mjcf=str(mjcf), **THEIRS).shapes
+    lengths = np.linalg.norm(shapes.ends[:, 1] - shapes.ends[:, 0], axis=1)
+    found = {name: (r, length) for name, r, length in zip(shapes.names, shapes.radii, lengths, strict=True)}
+    for name, radius, length in (("link1", 0.06, 0.2), ("link4", 0.06, 0.19), ("link6", 0.055, 0.0)):
+        assert found[name][0] == pytest.approx(radius, rel=0.06)
+        assert found[name][1] == pytest.approx(length, abs=0.012)
+
+
+def test_an_attached_model_is_part_of_the_hash_and_of_the_arm(mjcf, tmp_path):
+    part = (
+        '<mujoco><worldbody><body name="cam"><geom type="sphere" size=".03" mass="{}"/></body>'
+        "</worldbody></mujoco>"
+    )
+    (tmp_path / "cam.xml").write_text(part.format(1.0))
+    _changed(mjcf, "<asset>", '<asset><model name="cam" file="cam.xml"/>')
+    site = '<site name="attachment_site"'
+    path = _changed(mjcf, site, f'<attach model="cam" body="cam" prefix="c"/>{site}')
+    before = RobotConfig(mjcf=path, **THEIRS)
+    (tmp_path / "cam.xml").write_text(part.format(3.0))
+    after = RobotConfig(mjcf=path, **THEIRS)
+    assert before.files_sha256 != after.files_sha256
+    assert adopted(after).card.mass_kg - adopted(before).card.mass_kg == pytest.approx(2.0)
+
+
+def test_a_lost_mesh_takes_no_mass_with_it(mjcf):
+    cover = '<body name="cover"><geom type="mesh" mesh="lost" mass="0.8"/></body><body name="hand"'
+    path = _changed(mjcf, '<body name="hand"', cover)
+    assert "mass of body 'cover' comes from its geom" in _refused(mjcf=path, **THEIRS)
+
+
+def test_a_root_that_moves_is_welded_and_kept(mjcf):
+    """The rail is the root here, and the arm's own joints are named."""
+    card = adopted(RobotConfig(mjcf=str(mjcf), joints=NAMES)).card
+    assert any("'rail'" in line for line in card.left_out)
+    scene = _scene(mjcf=str(mjcf), joints=NAMES)
+    data = mujoco.MjData(scene.model)
+    mujoco.mj_kinematics(scene.model, data)
+    assert data.body("link1").xpos[2] == pytest.approx(0.15)  # from the rail's frame
+    assert scene.model.body("base").mass[0] > 4.0
+
+
+def test_what_the_form_has_no_place_for_is_refused(mjcf, tmp_path):
+    curved = _changed(mjcf, '<joint name="A2"', '<joint damping="1 0.5" name="A2"')
+    assert "'A2' has damping that is not linear" in _refused(mjcf=curved, **THEIRS)
+    path = tmp_path / "arm.urdf"
+    path.write_text(urdf_text().replace('velocity="1.2"', 'velocity="fast"'))
+    assert "joint 'joint_2': velocity=\"fast\" is no limit" in _refused(urdf=str(path))
+
+
+def test_inertia_on_the_edge_of_what_is_possible_is_kept(mjcf):
+    edge = '<inertial pos="0 .1 .02" euler="10 20 30" mass="3" diaginertia=".01 .013 .023"/>'
+    path = _changed(mjcf, '<inertial pos="0 .1 .02" mass="3" fullinertia=".02 .01 .02 .001 0 .002"/>', edge)
+    moments = np.sort(_scene(mjcf=path, **THEIRS).model.body("link2").inertia)
+    np.testing.assert_allclose(moments, [0.01, 0.013, 0.023], rtol=1e-12)
+
+
+def test_a_motor_in_the_parent_frame_of_a_hinge_is_a_motor(mjcf):
+    motor = '<motor jointinparent="A5" ctrlrange="-33 44"/>'
+    path = _changed(mjcf, '<motor joint="A5" ctrlrange="-40 40"/>', motor)
+    assert _scene(mjcf=path, **THEIRS).limits.torque[5] == 33.0
