@@ -20,12 +20,10 @@ from surgsim.control.port_estimators import PORT_ESTIMATORS
 from surgsim.control.resolvers import RESOLVERS
 from surgsim.control.torque_laws import TORQUE_LAWS
 from surgsim.metrics.catalog import METRICS, compute_metrics
+from surgsim.models.adopted.config import CapsuleConfig, FlangeConfig, LimitsConfig
 from surgsim.models.config import (
-    CapsuleConfig,
-    FlangeConfig,
     HolderConfig,
     InstrumentConfig,
-    LimitsConfig,
     RobotConfig,
     TrocarConfig,
     WallConfig,

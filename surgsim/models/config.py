@@ -22,12 +22,13 @@ from pydantic_core import PydanticCustomError
 
 from surgsim.catalog import PartConfig
 from surgsim.models.adopted.arm import adopted
-from surgsim.models.adopted.file import Kind, files_sha256
+from surgsim.models.adopted.config import KINDS as KINDS
+from surgsim.models.adopted.config import ArmFileConfig
+from surgsim.models.adopted.config import Vec3 as Vec3
+from surgsim.models.adopted.file import files_sha256
 from surgsim.models.adopted.problem import AdoptionError
 from surgsim.models.adopted.tool import Tool, read_tool
 from surgsim.models.folders import is_shipped, known_robot, robot_file, with_literal_variant
-
-Vec3 = tuple[FiniteFloat, FiniteFloat, FiniteFloat]
 
 
 @dataclass(frozen=True)
@@ -38,84 +39,13 @@ class ForEachJoint:
 PerJoint = Annotated[tuple[FiniteFloat, ...], ForEachJoint()]
 """A number for each joint, from the base on (n,)."""
 RobotName = Annotated[str, AfterValidator(known_robot)]
-Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
 
 
-class FlangeConfig(PartConfig):
-    """Where the tool is fixed in an arm's file; z is the tool axis.
-
-    Attributes:
-        site: A site of the file.
-        body: Or a body of the file.
-        position_m: Of the flange in the body's frame [m].
-        quaternion_wxyz: Of the flange in the body's frame.
-    """
-
-    site: str | None = None
-    body: str | None = None
-    position_m: Vec3 = (0.0, 0.0, 0.0)
-    quaternion_wxyz: tuple[FiniteFloat, FiniteFloat, FiniteFloat, FiniteFloat] = (1.0, 0.0, 0.0, 0.0)
-
-    @model_validator(mode="after")
-    def _is_one_place(self) -> Self:
-        if (self.site is None) == (self.body is None):
-            raise ValueError("give a site or a body")
-        moved = self.position_m != (0.0, 0.0, 0.0) or self.quaternion_wxyz != (1.0, 0.0, 0.0, 0.0)
-        if self.site is not None and moved:
-            raise ValueError("position_m and quaternion_wxyz are in a body's frame: give a body")
-        if not any(self.quaternion_wxyz):
-            raise ValueError("quaternion_wxyz must not be zero")
-        return self
-
-
-class LimitsConfig(PartConfig):
-    """What the joints of an arm from a file can do, each list with a number for each joint; null: the file's.
-
-    Attributes:
-        velocity_rad_per_s: Largest speeds [rad/s].
-        acceleration_rad_per_s2: Largest accelerations [rad/s^2].
-        torque_nm: Largest torques [N m].
-    """
-
-    velocity_rad_per_s: tuple[Positive, ...] | None = None
-    acceleration_rad_per_s2: tuple[Positive, ...] | None = None
-    torque_nm: tuple[Positive, ...] | None = None
-
-
-class CapsuleConfig(PartConfig):
-    """Where collisions of an arm from a file are looked for.
-
-    Attributes:
-        body: A body of the file.
-        from_m: One end of the axis in the body's frame [m].
-        to_m: The other end [m].
-        radius_m: [m].
-    """
-
-    body: str
-    from_m: Vec3
-    to_m: Vec3
-    radius_m: PositiveFloat
-
-
-class RobotConfig(PartConfig):
+class RobotConfig(ArmFileConfig):
     """Which arm, and where its base stands in the world: a name, or somebody's own file.
 
     Attributes:
         name: A robot's folder: one that is shipped, on the search path, or of an installed package.
-        mjcf: Or an MJCF file.
-        urdf: Or a URDF file.
-        base_body: Body of the file that the base is; null: the root of the arm.
-        joints: Joints of the file, from the base on; null: all from the base to the flange.
-        flange: Where the tool is fixed: a site, else a body of that name, or a place; null: the file's site
-            or body `flange`, `attachment_site` or `tool0`.
-        home_rad: A posture to prefer [rad]; null: the file's keyframe `home`.
-        limits: Limits that the file lacks, or that count before its own.
-        armature_kg_m2: Inertia of each motor as its joint feels it [kg m^2]; null: the file's. Files often
-            have none, and joints of the wrist are then lighter than any real one.
-        collision: `auto` fits capsules to the file's shapes; or a list of capsules.
-        files_sha256: Hash of the file and all that it names, of a robot's folder that is not shipped too;
-            filled in, and checked where it is given.
         base_position_m: Of the base in the world [m].
         base_yaw_rad: Turn of the base about the vertical [rad].
         dh_variant: `literal` takes d2 as Table 3 of the manipulability paper prints it, a misprint: for
@@ -123,16 +53,6 @@ class RobotConfig(PartConfig):
     """
 
     name: RobotName | None = None
-    mjcf: str | None = None
-    urdf: str | None = None
-    base_body: str | None = None
-    joints: tuple[str, ...] | None = None
-    flange: FlangeConfig | str | None = None
-    home_rad: tuple[FiniteFloat, ...] | None = None
-    limits: LimitsConfig = LimitsConfig()
-    armature_kg_m2: tuple[NonNegativeFloat, ...] | None = None
-    collision: Literal["auto"] | tuple[CapsuleConfig, ...] = "auto"
-    files_sha256: str | None = None
     base_position_m: Vec3 = (0.0, 0.0, 0.0)
     base_yaw_rad: FiniteFloat = 0.0
     dh_variant: Literal["standard", "literal"] = "standard"
@@ -179,43 +99,13 @@ class RobotConfig(PartConfig):
         }
 
     @property
-    def file(self) -> tuple[Path, Kind]:
-        """The arm's file, and which language it is in.
-
-        Raises:
-            ValueError: If the arm has a name instead.
-        """
-        if self.mjcf is not None:
-            return Path(self.mjcf), "mjcf"
-        if self.urdf is not None:
-            return Path(self.urdf), "urdf"
-        raise ValueError(f"'{self.name}' is no file")
-
-    @property
     def label(self) -> str:
         """What messages and tables call it: its name, or that of its file."""
         return self.name if self.name is not None else self.file[0].stem
 
-    @property
-    def listed_capsules(self) -> tuple[CapsuleConfig, ...]:
-        """The capsules that are given; none with `auto`."""
-        return () if isinstance(self.collision, str) else self.collision
 
-
-KINDS: tuple[Kind, ...] = ("mjcf", "urdf")
 PLACES, HASH = ("name", *KINDS), ("files_sha256",)
-OF_FILES = (
-    "mjcf",
-    "urdf",
-    "base_body",
-    "joints",
-    "flange",
-    "home_rad",
-    "limits",
-    "armature_kg_m2",
-    "collision",
-    *HASH,
-)
+OF_FILES = (*(key for key in ArmFileConfig.model_fields if key not in HASH), *HASH)
 """Keys that are for an arm from a file alone; the last one also for a robot's folder that is not shipped."""
 
 

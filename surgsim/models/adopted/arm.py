@@ -3,23 +3,19 @@
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import mujoco
 import numpy as np
 
 from surgsim.models.adopted.card import Card, card_of
 from surgsim.models.adopted.collisions import find_capsules, pairs_left_out, points_of, surfaces_of
+from surgsim.models.adopted.config import ArmFileConfig
 from surgsim.models.adopted.findings import Findings, read_arm
 from surgsim.models.adopted.form import add_text, draw, mechanics_of, write_capsules
 from surgsim.models.adopted.problem import AdoptionError
 from surgsim.models.adopted.surface import Surface, coarser
 from surgsim.models.adopted.written import mesh_name
 from surgsim.spatial import Array
-
-if TYPE_CHECKING:
-    from surgsim.models.config import RobotConfig
-
 
 _MOST_DRAWN, _FEWEST_DRAWN = 6000, 200
 """Triangles: of a link, and of each of its meshes."""
@@ -58,17 +54,18 @@ class Adopted:
         return spec
 
 
-def adopted(robot: "RobotConfig") -> Adopted:
+def adopted(robot: ArmFileConfig) -> Adopted:
     """The arm of the file that `robot` names; read once a process.
 
     Raises:
         AdoptionError: If the file or the keys of `robot` make no arm.
     """
-    return _adopted(robot.model_copy(update={"base_position_m": (0.0, 0.0, 0.0), "base_yaw_rad": 0.0}))
+    keys = ArmFileConfig.model_fields  # not where a scenario puts the arm
+    return _adopted(ArmFileConfig.model_construct(**{key: getattr(robot, key) for key in keys}))
 
 
 @lru_cache(maxsize=32)
-def _adopted(robot: "RobotConfig") -> Adopted:
+def _adopted(robot: ArmFileConfig) -> Adopted:
     found = read_arm(robot)
     home, remark = _home(found, robot)
     spec = mechanics_of(found, home)
@@ -84,7 +81,7 @@ def _adopted(robot: "RobotConfig") -> Adopted:
     return Adopted(mechanics=spec, surfaces=drawn, card=card)
 
 
-def _home(found: Findings, robot: "RobotConfig") -> tuple[Array | None, str | None]:
+def _home(found: Findings, robot: ArmFileConfig) -> tuple[Array | None, str | None]:
     """The home posture (n,) [rad] that the scenario or the file's keyframe `home` gives, and a remark."""
     model, joints = found.model, found.chain.joints
     low, high = found.limits.position.T

@@ -2,16 +2,13 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import mujoco
 import numpy as np
 
+from surgsim.models.adopted.config import ArmFileConfig, FlangeConfig
 from surgsim.models.adopted.problem import AdoptionError, listed
 from surgsim.spatial import Array
-
-if TYPE_CHECKING:
-    from surgsim.models.config import FlangeConfig, RobotConfig
 
 FEWEST, MOST = 6, 8
 """Joints of an arm."""
@@ -41,7 +38,7 @@ class Chain:
     R_LF: Array
 
 
-def find_chain(model: mujoco.MjModel, robot: "RobotConfig") -> Chain:
+def find_chain(model: mujoco.MjModel, robot: ArmFileConfig) -> Chain:
     """The chain that `robot` asks for, or that is there.
 
     Raises:
@@ -60,7 +57,7 @@ def find_chain(model: mujoco.MjModel, robot: "RobotConfig") -> Chain:
     return Chain(base=base, joints=tuple(joints), links=links, flange_body=flange_body, p_LF=p_LF, R_LF=R_LF)
 
 
-def _flange(model: mujoco.MjModel, flange: "FlangeConfig | str | None") -> tuple[int, Array, Array]:
+def _flange(model: mujoco.MjModel, flange: FlangeConfig | str | None) -> tuple[int, Array, Array]:
     """Body, place and axes of the flange."""
     if flange is None:
         flange = next((name for name in KNOWN_FLANGES if _place_named(model, name) is not None), None)

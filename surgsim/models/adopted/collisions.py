@@ -1,11 +1,10 @@
 """Where contacts of an arm are looked for: capsules around its links, and pairs of them that can touch."""
 
-from typing import TYPE_CHECKING
-
 import mujoco
 import numpy as np
 
 from surgsim.models.adopted.capsules import Capsule, capsules_around, capsules_in
+from surgsim.models.adopted.config import ArmFileConfig
 from surgsim.models.adopted.findings import Findings
 from surgsim.models.adopted.form import flange_in_last_link
 from surgsim.models.adopted.limits import Limits
@@ -13,9 +12,6 @@ from surgsim.models.adopted.problem import AdoptionError
 from surgsim.models.adopted.surface import Surface, hull, surface_of, thinned
 from surgsim.models.adopted.touching import never_touch
 from surgsim.spatial import Array
-
-if TYPE_CHECKING:
-    from surgsim.models.config import RobotConfig
 
 BARE_RADIUS_M = 0.05
 """Of the capsule of a link that has no shape."""
@@ -58,7 +54,7 @@ def points_of(surfaces: list[Surface]) -> Array:
 
 
 def find_capsules(
-    found: Findings, points: dict[str, Array], robot: "RobotConfig"
+    found: Findings, points: dict[str, Array], robot: ArmFileConfig
 ) -> dict[str, list[Capsule]]:
     """Capsules of each part: listed by the scenario, stated by the file, or fitted to `points`.
 
@@ -92,7 +88,7 @@ def _stated_capsules(found: Findings) -> dict[str, list[Capsule]] | None:
     return stated
 
 
-def _listed_capsules(found: Findings, robot: "RobotConfig") -> dict[str, list[Capsule]]:
+def _listed_capsules(found: Findings, robot: ArmFileConfig) -> dict[str, list[Capsule]]:
     """The capsules that the scenario lists, by the file's bodies."""
     model, parts = found.model, found.parts
     data = _at_zero(model)

@@ -2,20 +2,17 @@
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import mujoco
 import numpy as np
 
 from surgsim.models.adopted.chain import Chain, find_chain
+from surgsim.models.adopted.config import ArmFileConfig
 from surgsim.models.adopted.file import ModelFile, read_file
 from surgsim.models.adopted.limits import Limits, find_limits
 from surgsim.models.adopted.links import Link, Links, rigid_links
 from surgsim.models.adopted.problem import AdoptionError
 from surgsim.spatial import Array
-
-if TYPE_CHECKING:
-    from surgsim.models.config import RobotConfig
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -58,7 +55,7 @@ class Findings:
         return self.links.links[-1]
 
 
-def read_arm(robot: "RobotConfig") -> Findings:
+def read_arm(robot: ArmFileConfig) -> Findings:
     """What the file that `robot` names holds.
 
     Raises:

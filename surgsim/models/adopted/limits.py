@@ -1,18 +1,15 @@
 """What the joints of an arm can do: from the scenario, else the file, else assumed where that is harmless."""
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import mujoco
 import numpy as np
 
 from surgsim.models.adopted.chain import Chain
+from surgsim.models.adopted.config import ArmFileConfig
 from surgsim.models.adopted.file import ModelFile
 from surgsim.models.adopted.problem import AdoptionError, listed
 from surgsim.spatial import Array
-
-if TYPE_CHECKING:
-    from surgsim.models.config import RobotConfig
 
 ASSUMED_VELOCITY_RAD_PER_S = 3.14159
 ASSUMED_ACCELERATION_RAD_PER_S2 = 5.23599
@@ -44,7 +41,7 @@ class Limits:
     assumed: tuple[str, ...]
 
 
-def find_limits(file: ModelFile, chain: Chain, robot: "RobotConfig") -> Limits:
+def find_limits(file: ModelFile, chain: Chain, robot: ArmFileConfig) -> Limits:
     """Limits of the arm in `file`; what `robot.limits` gives counts before what the file says.
 
     Raises:
