@@ -10,6 +10,8 @@ from pathlib import Path
 
 import pytest
 
+from surgsim.scenario.drawn import drawn_names
+
 ROOT = Path(__file__).resolve().parents[1]
 PIP = (sys.executable, "-m", "pip", "--quiet", "--no-input", "--disable-pip-version-check")
 
@@ -74,6 +76,7 @@ def test_it_runs_a_shipped_scenario_by_name_from_anywhere(installed: Path, tmp_p
     assert {item["name"] for item in listed} == {
         *(path.stem for path in (ROOT / "scenarios").glob("*.yaml")),
         *(f"safety/{path.stem}" for path in (ROOT / "scenarios" / "safety").glob("*.yaml")),
+        *drawn_names(),
     }
     short = ("--set", "task.duration_s=2", "--set", "task.hold_end_s=0")
     text = python("-m", "surgsim", "run", "circle_lwr4plus", "--no-record", "--json", "--out", "run", *short)

@@ -65,7 +65,8 @@ class RobotConfig(ArmFileConfig):
             keys = OF_FILES if is_shipped(self.name) else OF_FILES[: -len(HASH)]
             strange = [key for key in keys if getattr(self, key) != type(self).model_fields[key].default]
             if strange:
-                raise ValueError(f"{strange[0]} is for an arm from a file; '{self.name}' has its own")
+                reason = f"{strange[0]} is for an arm from a file; '{self.name}' has its own"
+                raise PydanticCustomError("placed", "{text}", {"text": reason, "at": (strange[0],)})
         if self.dh_variant == "literal" and self.name not in (known := with_literal_variant()):
             raise ValueError(f"dh_variant 'literal' is of '{', '.join(known)}' alone, not of '{self.label}'")
         if self.name is None or not is_shipped(self.name):
