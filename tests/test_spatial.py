@@ -3,7 +3,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from surgsim.spatial import cross, nearest_on_line, plane_axes, shaft_distance, skew, unit
+from surgsim.spatial import (
+    cross,
+    nearest_on_line,
+    plane_axes,
+    segment_distance_squared,
+    shaft_distance,
+    skew,
+    unit,
+)
 
 vectors = st.lists(st.floats(-10, 10), min_size=3, max_size=3).map(np.array)
 
@@ -53,3 +61,11 @@ def test_the_nearest_point_of_a_line_is_that_of_least_squares():
         t = np.linalg.lstsq((b[i] - a[i])[:, None], p[i] - b[i], rcond=None)[0]
         np.testing.assert_allclose(found[i], b[i] + t * (b[i] - a[i]), atol=1e-12)
         assert np.linalg.norm(found[i] - p[i]) == pytest.approx(shaft_distance(p[i], b[i], a[i]))
+
+
+@pytest.mark.parametrize("turned", [False, True])
+def test_a_point_is_as_far_from_a_segment_as_from_its_nearest_point(turned):
+    point, start, end = np.array([0.5, 0.3, 0.0]), np.zeros(3), np.array([1.0, 0.0, 0.0])
+    pair = ((point, point), (start, end))
+    (a0, a1), (b0, b1) = pair[::-1] if turned else pair
+    assert segment_distance_squared(a0, a1, b0, b1) == pytest.approx(0.09)

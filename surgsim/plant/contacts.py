@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from surgsim.compiled import compiled
 from surgsim.models.build import Scene
 from surgsim.plant.truth import Contact
+from surgsim.spatial import segment_distance_squared
 from surgsim.tick.arrays import Record, World, new
 from surgsim.tick.scratch import scratch
 from surgsim.tick.views import doubles, vector, words
@@ -237,34 +238,6 @@ def forbidden_contact(watch: Watch, p_WC: Array) -> tuple[int, int, float, float
         if beside > SKIN_MARGIN_M:
             return shaft, _SKIN, beside, 0.0
     return 0, NOTHING, 0.0, room
-
-
-@compiled
-def segment_distance_squared(a0: Array, a1: Array, b0: Array, b1: Array) -> float:
-    """Least squared distance [m²] between two segments, each of positive length or a point.
-
-    Source: Ericson, Real-Time Collision Detection, 2005, section 5.1.9.
-    """
-    a = e = b = c = f = 0.0
-    for j in range(3):
-        u, v, r = a1[j] - a0[j], b1[j] - b0[j], a0[j] - b0[j]
-        a, e, b, c, f = a + u * u, e + v * v, b + u * v, c + u * r, f + v * r
-    s = t = 0.0
-    if a > 1e-12:
-        det = a * e - b * b
-        if det > 1e-12:
-            s = min(max((b * f - c * e) / det, 0.0), 1.0)
-        t = (b * s + f) / e if e > 1e-12 else 0.0
-        if t < 0.0 or t > 1.0:
-            t = min(max(t, 0.0), 1.0)
-            s = min(max((b * t - c) / a, 0.0), 1.0)
-    elif e > 1e-12:
-        t = min(max(f / e, 0.0), 1.0)
-    square = 0.0
-    for j in range(3):
-        d = a0[j] + s * (a1[j] - a0[j]) - b0[j] - t * (b1[j] - b0[j])
-        square += d * d
-    return square
 
 
 @compiled

@@ -7,9 +7,10 @@ import pytest
 from surgsim.models.build import build
 from surgsim.models.collision import abdomen_semi_axes
 from surgsim.models.config import RobotConfig, SceneConfig, TrocarConfig
-from surgsim.plant.contacts import ContactWatch, body_gap, is_clear, segment_distance_squared, table_gap
+from surgsim.plant.contacts import ContactWatch, body_gap, is_clear, table_gap
 from surgsim.scenario.load import load_scenario, shipped
 from surgsim.simulate.setup import prepare
+from surgsim.spatial import segment_distance_squared
 
 PORT = (0.0, 0.55, 0.2)
 SCENE = SceneConfig(robot=RobotConfig(name="lwr4plus"), trocar=TrocarConfig(position_m=PORT), theatre=False)

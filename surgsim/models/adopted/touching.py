@@ -11,7 +11,7 @@ from scipy.spatial import cKDTree
 
 from surgsim.models.adopted.capsules import Capsule
 from surgsim.models.adopted.surface import SPACING_M
-from surgsim.spatial import Array
+from surgsim.spatial import Array, segment_distance_squared
 
 NEXT_THAT_CAN_TOUCH = 3
 """Along the chain: nearer parts are held apart by the joints' ranges."""
@@ -96,23 +96,10 @@ def _overlap(
 ) -> bool:
     (p, R), (p2, R2) = places[one], places[other]
     return any(
-        segments_distance(p + a.ends @ R.T, p2 + b.ends @ R2.T) < a.radius + b.radius
+        segment_distance_squared(*(p + a.ends @ R.T), *(p2 + b.ends @ R2.T)) < (a.radius + b.radius) ** 2
         for a in capsules[one]
         for b in capsules[other]
     )
-
-
-def segments_distance(one: Array, other: Array) -> float:
-    """Least distance [m] of two segments, each given by its ends (2, 3) [m]."""
-    d, e, r = one[1] - one[0], other[1] - other[0], one[0] - other[0]
-    a, f, c, b = float(d @ d), float(e @ e), float(d @ r), float(d @ e)
-    g = float(e @ r)
-    s = np.clip((b * g - c * f) / (a * f - b * b), 0.0, 1.0) if a * f - b * b > 1e-15 else 0.0
-    t = (b * s + g) / f if f > 1e-15 else 0.0
-    t = min(max(t, 0.0), 1.0)
-    s = min(max((b * t - c) / a, 0.0), 1.0) if a > 1e-15 else 0.0
-    t = min(max((b * s + g) / f, 0.0), 1.0) if f > 1e-15 else 0.0
-    return float(np.linalg.norm(r + s * d - t * e))
 
 
 def _meet(

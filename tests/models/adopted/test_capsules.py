@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from surgsim.models.adopted.capsules import Capsule, capsule_around, capsules_around
 from surgsim.models.adopted.surface import Surface, coarser, hull, thinned
-from surgsim.models.adopted.touching import segments_distance
+from surgsim.spatial import segment_distance_squared
 
 
 def _on_capsule(rng, ends, radius, count=2000):
@@ -62,7 +62,7 @@ def test_the_distance_of_segments_is_the_least_of_many(seed):
     s = np.linspace(0.0, 1.0, 201)[:, None]
     a, b = one[0] + s * (one[1] - one[0]), other[0] + s * (other[1] - other[0])
     least = np.min(np.linalg.norm(a[:, None] - b[None], axis=2))
-    found = segments_distance(one, other)
+    found = np.sqrt(segment_distance_squared(*one, *other))
     assert found <= least + 1e-12
     assert found >= least - 0.03
 

@@ -4,10 +4,11 @@ import mujoco
 import numpy as np
 import pytest
 
-from surgsim.models.adopted.touching import NEXT_THAT_CAN_TOUCH, segments_distance
+from surgsim.models.adopted.touching import NEXT_THAT_CAN_TOUCH
 from surgsim.models.build import Scene, build
 from surgsim.models.config import RobotConfig, SceneConfig
 from surgsim.models.folders import robot_file
+from surgsim.spatial import segment_distance_squared
 
 POSTURES = 150
 DEEP_M = 0.01
@@ -48,7 +49,8 @@ def _capsules_touch(scene: Scene, data: mujoco.MjData) -> bool:
         for body, local in zip(shapes.bodies, shapes.ends, strict=True)
     ]
     return any(
-        segments_distance(ends[i], ends[j]) < shapes.radii[i] + shapes.radii[j] for i, j in shapes.pairs
+        segment_distance_squared(*ends[i], *ends[j]) < (shapes.radii[i] + shapes.radii[j]) ** 2
+        for i, j in shapes.pairs
     )
 
 
