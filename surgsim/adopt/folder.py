@@ -155,12 +155,8 @@ def _origin(adoption: Adoption) -> list[str]:
     path, kind = adoption.robot.file
     return [
         f"From the {kind.upper()} file {path.name}; the file and all that it names have the hash",
-        _sha(adoption),
+        f"sha256 {adoption.robot.files_sha256}",
     ]
-
-
-def _sha(adoption: Adoption) -> str:
-    return f"sha256 {adoption.robot.files_sha256}"
 
 
 def card_rows(adoption: Adoption) -> list[tuple[str, str]]:

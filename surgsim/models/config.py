@@ -25,7 +25,7 @@ from surgsim.models.adopted.arm import adopted
 from surgsim.models.adopted.config import KINDS as KINDS
 from surgsim.models.adopted.config import ArmFileConfig
 from surgsim.models.adopted.config import Vec3 as Vec3
-from surgsim.models.adopted.file import files_sha256
+from surgsim.models.adopted.file import checked_sha256
 from surgsim.models.adopted.problem import AdoptionError
 from surgsim.models.adopted.tool import Tool, read_tool
 from surgsim.models.folders import is_shipped, known_robot, robot_file, with_literal_variant
@@ -77,13 +77,7 @@ class RobotConfig(ArmFileConfig):
     def _read_file(self) -> None:
         """Fill in the file's whole path and the hash of what it holds, and see that it is an arm."""
         path, kind = self.file if self.name is None else (robot_file(self.name), KINDS[0])
-        found = files_sha256(path, kind)
-        if self.files_sha256 not in (None, found):
-            raise AdoptionError(
-                f"{path} or a file that it names has changed since files_sha256 was written; leave the key "
-                f"out to take it as it now is",
-                "files_sha256",
-            )
+        found = checked_sha256(path, kind, self.files_sha256)
         object.__setattr__(self, "files_sha256", found)  # frozen, but still being made
         if self.name is None:
             object.__setattr__(self, kind, os.path.abspath(path))
@@ -178,13 +172,7 @@ class InstrumentConfig(PartConfig):
         stated = [key for key in OF_ROD if key in self.model_fields_set]
         if stated:
             raise AdoptionError(f"{stated[0]} is read from the instrument's file: leave it out", stated[0])
-        found = files_sha256(path, "mjcf")
-        if self.files_sha256 not in (None, found):
-            raise AdoptionError(
-                f"{path} or a file that it names has changed since files_sha256 was written; leave the key "
-                f"out to take it as it now is",
-                "files_sha256",
-            )
+        found = checked_sha256(path, "mjcf", self.files_sha256)
         object.__setattr__(self, "files_sha256", found)  # frozen, but still being made
         object.__setattr__(self, "mjcf", os.path.abspath(path))
         for key in ("adapter_length_m", "shaft_length_m"):

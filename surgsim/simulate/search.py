@@ -44,9 +44,7 @@ def roomiest(reach: Reach, places: Array, guess: Array, *, clear: bool) -> Start
     last = [reach.start(every, each.q) for each in _apart(better, guess)[:_FINALISTS]]
     best = _apart([reach.improved(every, each, directions, *_FINE) for each in last], guess)[0]
     q = reach.turned_inside(every, best.q)
-    for _ in range(
-        _LAST_SETTLINGS
-    ):  # near a singularity one is not enough; following a path is the first one
+    for _ in range(_LAST_SETTLINGS):  # near a singularity one is not enough; a path begins with the first
         q = reach.settle(places[0], q)
     return reach.start(every, q)
 

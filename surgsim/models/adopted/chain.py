@@ -8,7 +8,8 @@ import numpy as np
 
 from surgsim.models.adopted.config import ArmFileConfig, FlangeConfig
 from surgsim.models.adopted.problem import AdoptionError, listed
-from surgsim.spatial import Array
+from surgsim.models.adopted.turns import axes_of
+from surgsim.spatial import Array, unit
 
 FEWEST, MOST = 6, 8
 """Joints of an arm."""
@@ -66,7 +67,7 @@ def _flange(model: mujoco.MjModel, flange: FlangeConfig | str | None) -> tuple[i
     if flange.site is not None:
         return _at_site(model, _id(model, "site", flange.site, "flange", "site"))
     body = _id(model, "body", flange.body or "", "flange", "body")
-    return body, np.array(flange.position_m), _matrix(np.array(flange.quaternion_wxyz))
+    return body, np.array(flange.position_m), axes_of(unit(np.array(flange.quaternion_wxyz)))
 
 
 def _place_named(model: mujoco.MjModel, name: str) -> tuple[int, Array, Array] | None:
@@ -97,13 +98,7 @@ def _named_flange(model: mujoco.MjModel, name: str | None) -> tuple[int, Array, 
 
 
 def _at_site(model: mujoco.MjModel, site: int) -> tuple[int, Array, Array]:
-    return int(model.site_bodyid[site]), model.site_pos[site].copy(), _matrix(model.site_quat[site])
-
-
-def _matrix(quaternion: Array) -> Array:
-    turn = np.zeros(9)
-    mujoco.mju_quat2Mat(turn, quaternion / np.linalg.norm(quaternion))
-    return turn.reshape(3, 3)
+    return int(model.site_bodyid[site]), model.site_pos[site].copy(), axes_of(model.site_quat[site])
 
 
 def _way_to(model: mujoco.MjModel, body: int) -> list[int]:

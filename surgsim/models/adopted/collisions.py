@@ -11,6 +11,7 @@ from surgsim.models.adopted.limits import Limits
 from surgsim.models.adopted.problem import AdoptionError
 from surgsim.models.adopted.surface import Surface, hull, surface_of, thinned
 from surgsim.models.adopted.touching import never_touch
+from surgsim.models.adopted.turns import at_zero
 from surgsim.spatial import Array
 
 BARE_RADIUS_M = 0.05
@@ -28,7 +29,7 @@ def surfaces_of(found: Findings) -> tuple[dict[str, list[Surface]], dict[str, li
     for contacts often leave much of a link out; without a mesh what has contacts, else all.
     """
     model = found.model
-    data = _at_zero(model)
+    data = at_zero(model)
     drawn: dict[str, list[Surface]] = {}
     solid: dict[str, list[Surface]] = {}
     for name, link in found.parts.items():
@@ -91,7 +92,7 @@ def _stated_capsules(found: Findings) -> dict[str, list[Capsule]] | None:
 def _listed_capsules(found: Findings, robot: ArmFileConfig) -> dict[str, list[Capsule]]:
     """The capsules that the scenario lists, by the file's bodies."""
     model, parts = found.model, found.parts
-    data = _at_zero(model)
+    data = at_zero(model)
     capsules: dict[str, list[Capsule]] = {name: [] for name in parts}
     for i, given in enumerate(robot.listed_capsules):
         body = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, given.body)
@@ -103,14 +104,6 @@ def _listed_capsules(found: Findings, robot: ArmFileConfig) -> dict[str, list[Ca
         ends = np.array([given.from_m, given.to_m]) @ turn.T + data.xpos[body]
         capsules[part].append(Capsule(ends=(ends - link.p_WL) @ link.R_WL, radius=given.radius_m))
     return capsules
-
-
-def _at_zero(model: mujoco.MjModel) -> mujoco.MjData:
-    """Where everything is with all joints at their zero."""
-    data = mujoco.MjData(model)
-    data.qpos[:] = model.qpos0
-    mujoco.mj_kinematics(model, data)
-    return data
 
 
 def pairs_left_out(

@@ -97,6 +97,22 @@ def files_sha256(path: Path, kind: Kind) -> str:
     return digest.hexdigest()
 
 
+def checked_sha256(path: Path, kind: Kind, stated: str | None) -> str:
+    """`files_sha256`, which must be the one that is `stated`, if one is.
+
+    Raises:
+        AdoptionError: If it is another, or the file cannot be read.
+    """
+    found = files_sha256(path, kind)
+    if stated not in (None, found):
+        raise AdoptionError(
+            f"{path} or a file that it names has changed since files_sha256 was written; leave the key out "
+            f"to take it as it now is",
+            "files_sha256",
+        )
+    return found
+
+
 def _parsed(path: Path, kind: Kind, text: str | None) -> mujoco.MjSpec:
     try:
         return mujoco.MjSpec.from_file(str(path)) if text is None else mujoco.MjSpec.from_string(text)

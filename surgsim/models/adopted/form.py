@@ -8,6 +8,7 @@ import numpy as np
 from surgsim.models.adopted.capsules import Capsule
 from surgsim.models.adopted.findings import Findings
 from surgsim.models.adopted.surface import Surface
+from surgsim.models.adopted.turns import at_zero, quaternion_of
 from surgsim.spatial import Array
 
 _OPTIONAL = ("jerk_limit_rad_per_s3", "torque_rate_limit_nm_per_s")
@@ -26,13 +27,13 @@ def mechanics_of(found: Findings, home: Array | None) -> mujoco.MjSpec:
         body = body.add_body(name=name)
         if above is not None:
             body.pos = above.R_WL.T @ (link.p_WL - above.p_WL)
-            body.quat = quaternion(above.R_WL.T @ link.R_WL)
+            body.quat = quaternion_of(above.R_WL.T @ link.R_WL)
         set_inertia(body, link.mass, link.com, link.inertia, link.R_LI)
         if i > 0:
             _add_joint(body, found, i - 1)
         above = link
     p, R = flange_in_last_link(found)
-    body.add_site(name="flange", pos=p, quat=quaternion(R), group=4)
+    body.add_site(name="flange", pos=p, quat=quaternion_of(R), group=4)
     for i in range(n):
         motor = spec.add_actuator(name=f"motor{i + 1}", target=f"joint{i + 1}")
         motor.trntype = mujoco.mjtTrn.mjTRN_JOINT
@@ -53,7 +54,7 @@ def set_inertia(body: mujoco.MjsBody, mass: float, com: Array, inertia: Array, a
     body.explicitinertial = True
     body.mass, body.ipos = mass, com
     if mass > 0.0:
-        body.inertia, body.iquat = inertia, quaternion(axes)
+        body.inertia, body.iquat = inertia, quaternion_of(axes)
 
 
 def _add_joint(body: mujoco.MjsBody, found: Findings, i: int) -> None:
@@ -101,9 +102,7 @@ def draw(spec: mujoco.MjSpec, body: str, name: str, surface: Surface) -> None:
 def flange_in_last_link(found: Findings) -> tuple[Array, Array]:
     """Place (3,) [m] and axes (3, 3) of the flange in the last link's frame."""
     model, chain, last = found.model, found.chain, found.last
-    data = mujoco.MjData(model)
-    data.qpos[:] = model.qpos0
-    mujoco.mj_kinematics(model, data)
+    data = at_zero(model)
     turn = data.xmat[chain.flange_body].reshape(3, 3)
     place = data.xpos[chain.flange_body] + turn @ chain.p_LF
     return last.to(place), last.R_WL.T @ turn @ chain.R_LF
@@ -111,13 +110,6 @@ def flange_in_last_link(found: Findings) -> tuple[Array, Array]:
 
 def _label(path: Path) -> str:
     return "".join(c if c.isalnum() or c == "_" else "_" for c in path.stem) or "arm"
-
-
-def quaternion(turn: Array) -> Array:
-    """Of a matrix of axes (3, 3), as wxyz (4,)."""
-    found = np.zeros(4)
-    mujoco.mju_mat2Quat(found, np.ascontiguousarray(turn).ravel())
-    return found
 
 
 def _add_numeric(spec: mujoco.MjSpec, name: str, values: Array) -> None:

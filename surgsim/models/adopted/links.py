@@ -7,6 +7,7 @@ import mujoco
 import numpy as np
 
 from surgsim.models.adopted.chain import Chain
+from surgsim.models.adopted.turns import at_zero, axes_of
 from surgsim.spatial import Array
 
 _WORLD = 0
@@ -63,10 +64,7 @@ def rigid_links(model: mujoco.MjModel, chain: Chain) -> Links:
     Joints that are not of the chain stay at their zero. What hangs on the last link with joints of its own,
     and does not carry the flange, is an attached hand: it is left out, since an instrument takes its place.
     """
-    data = mujoco.MjData(model)
-    data.qpos[:] = model.qpos0
-    mujoco.mj_kinematics(model, data)
-    mujoco.mj_comPos(model, data)
+    data = at_zero(model)
     children: dict[int, list[int]] = {body: [] for body in range(model.nbody)}
     for body in range(1, model.nbody):
         children[int(model.body_parentid[body])].append(body)
@@ -124,8 +122,8 @@ def _link(model: mujoco.MjModel, data: mujoco.MjData, bodies: tuple[int, ...]) -
     p_WL, R_WL = data.xpos[own].copy(), data.xmat[own].reshape(3, 3).copy()
     masses = model.body_mass[list(bodies)]
     mass = float(masses.sum())
-    if len(bodies) == 1 or mass == 0.0 or masses[0] == mass:  # as it is, to the last bit
-        com, turn = model.body_ipos[own].copy(), matrix(model.body_iquat[own])
+    if len(bodies) == 1 or mass == 0.0 or masses[0] == mass:  # as it is
+        com, turn = model.body_ipos[own].copy(), axes_of(model.body_iquat[own])
         moments = model.body_inertia[own].copy()
         return Link(bodies=bodies, p_WL=p_WL, R_WL=R_WL, mass=mass, com=com, inertia=moments, R_LI=turn)
     com_W, inertia_W = inertia_together(model, data, bodies)
@@ -160,10 +158,3 @@ def inertia_together(
         own = turn @ np.diag(model.body_inertia[body]) @ turn.T
         inertia += own + mass * (r @ r * np.eye(3) - np.outer(r, r))
     return com, inertia
-
-
-def matrix(quaternion: Array) -> Array:
-    """Axes (3, 3) of a quaternion wxyz (4,)."""
-    turn = np.zeros(9)
-    mujoco.mju_quat2Mat(turn, quaternion)
-    return turn.reshape(3, 3)

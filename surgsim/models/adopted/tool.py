@@ -12,10 +12,11 @@ import mujoco
 import numpy as np
 
 from surgsim.models.adopted.file import read_file
-from surgsim.models.adopted.form import draw, quaternion, set_inertia
+from surgsim.models.adopted.form import draw, set_inertia
 from surgsim.models.adopted.links import inertia_together, principal
 from surgsim.models.adopted.problem import AdoptionError, listed
 from surgsim.models.adopted.surface import Surface, coarser, surface_of
+from surgsim.models.adopted.turns import at_zero, quaternion_of
 from surgsim.spatial import Array
 
 _LEAST_SHAFT_M, _MOST_SHAFT_M = 0.05, 1.0
@@ -65,9 +66,7 @@ def read_tool(path: Path, entry_site: str, tip_site: str, files_sha256: str) -> 
     """
     del files_sha256
     model = read_file(path, "mjcf").model
-    data = mujoco.MjData(model)
-    mujoco.mj_kinematics(model, data)
-    mujoco.mj_comPos(model, data)
+    data = at_zero(model)
     if model.nbody < 2:
         raise AdoptionError(f"{path} has no body", "mjcf")
     root = 1
@@ -129,7 +128,7 @@ def tool_spec(tool: Tool) -> mujoco.MjSpec:
     spec.modelname = "instrument_from_file"
     spec.compiler.degree = False
     spec.compiler.balanceinertia = False
-    body = spec.worldbody.add_body(name="instrument", pos=tool.p_ET, quat=quaternion(tool.R_ET))
+    body = spec.worldbody.add_body(name="instrument", pos=tool.p_ET, quat=quaternion_of(tool.R_ET))
     set_inertia(body, tool.mass, tool.com, tool.inertia, tool.R_TI)
     entry, tip = tool.adapter_length_m, tool.adapter_length_m + tool.shaft_length_m
     body.add_site(name="shaft_entry", pos=[0.0, 0.0, entry], group=4)
