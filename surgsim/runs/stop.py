@@ -6,14 +6,16 @@ import signal
 import sys
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from types import FrameType
+from typing import Any
 
 _SIGNALS = tuple(
     getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)
 )  # Ctrl-C; the time limit of a cluster, `timeout`, a container's end; a closed terminal
 _GRACE_S = 5.0
+_AGAIN_S = 0.01
 
 
 class Stopped(KeyboardInterrupt):
@@ -53,6 +55,12 @@ def stopping_in_order() -> Iterator[None]:
         last = now
         raise Stopped(number)
 
+    def as_if_it_had_not_come() -> None:
+        nonlocal last
+        last = -_GRACE_S
+
+    dropped = sys.unraisablehook
+    sys.unraisablehook = _sending_again(dropped, as_if_it_had_not_come)
     before = {number: signal.getsignal(number) for number in _SIGNALS}
     taken = [number for number, handler in before.items() if handler not in (signal.SIG_IGN, None)]
     for number in taken:
@@ -62,6 +70,33 @@ def stopping_in_order() -> Iterator[None]:
     finally:
         for number in taken:
             signal.signal(number, before[number])
+        sys.unraisablehook = dropped
+
+
+def _sending_again(
+    otherwise: Callable[[Any], object], before: Callable[[], object]
+) -> Callable[["sys.UnraisableHookArgs"], None]:
+    """A hook that sends a signal again whose exception Python dropped, after a call of `before`.
+
+    Python drops and prints what is raised while it finalises an object, and a signal may come just then. The
+    hook does not raise, it would be dropped too: the signal comes again a moment later.
+
+    Args:
+        otherwise: What is to be done with any other exception that was dropped.
+        before: Makes the handler ready for the signal.
+    """
+
+    def hook(dropped: "sys.UnraisableHookArgs") -> None:
+        error = dropped.exc_value
+        if not isinstance(error, Stopped | _Leaving):
+            otherwise(dropped)
+            return
+        before()
+        again = threading.Timer(_AGAIN_S, os.kill, (os.getpid(), error.exit_status - 128))
+        again.daemon = True
+        again.start()
+
+    return hook
 
 
 def obey_parent() -> None:
@@ -70,7 +105,8 @@ def obey_parent() -> None:
     The worker ends at once when its parent does, so that a resumed batch never meets an old one.
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    signal.signal(signal.SIGTERM, _leave)
+    _leave_at_a_signal()
+    sys.unraisablehook = _sending_again(sys.unraisablehook, _leave_at_a_signal)
     threading.Thread(target=_die_with_parent, daemon=True).start()
 
 
@@ -86,9 +122,25 @@ def leave_in_peace() -> None:
     signal.signal(signal.SIGTERM, signal.SIG_IGN)
 
 
+class _Leaving(SystemExit):
+    """A signal asked the worker to end.
+
+    Attributes:
+        exit_status: What it ends with.
+    """
+
+    def __init__(self, number: int) -> None:
+        self.exit_status = 128 + number
+        super().__init__(self.exit_status)
+
+
+def _leave_at_a_signal() -> None:
+    signal.signal(signal.SIGTERM, _leave)
+
+
 def _leave(number: int, _: FrameType | None) -> None:
     signal.signal(number, signal.SIG_IGN)
-    sys.exit(128 + number)
+    raise _Leaving(number)
 
 
 @contextmanager

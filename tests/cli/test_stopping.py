@@ -169,3 +169,39 @@ def test_a_second_signal_does_not_disturb_the_tidying_and_handlers_are_put_back(
         command()
     assert tidied
     assert signal.getsignal(signal.SIGTERM) is before
+
+
+FINALISED = """
+import os, signal, time
+from surgsim.runs.stop import Stopped, obey_parent, stopping_in_order
+
+class Finalised:
+    def __del__(self):
+        os.kill(os.getpid(), signal.SIGTERM)
+        for _ in range(100):  # the handler raises here, and Python drops what it raises
+            time.sleep(0.001)
+
+def last_long():
+    Finalised()
+    time.sleep(20.0)
+"""
+COMMAND = """
+try:
+    with stopping_in_order():
+        last_long()
+except Stopped as stopped:
+    raise SystemExit(stopped.exit_status)
+"""
+WORKER = """
+obey_parent()
+last_long()
+"""
+
+
+@pytest.mark.parametrize("process", [COMMAND, WORKER], ids=["command", "worker"])
+def test_a_signal_that_comes_while_an_object_is_finalised_is_not_lost(process):
+    began = time.monotonic()
+    words = [sys.executable, "-c", FINALISED + process]
+    done = subprocess.run(words, capture_output=True, text=True, timeout=60, check=False)
+    assert (done.returncode, done.stderr) == (128 + signal.SIGTERM, "")
+    assert time.monotonic() - began < 15.0
