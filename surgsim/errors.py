@@ -88,4 +88,5 @@ class Outcome(enum.Enum):
     PATIENT_COLLISION = "The arm or its instrument touched the patient or the table."
     INCISION_TORN = "The shaft pressed on the abdominal wall harder than the incision bears."
     FORCE_LIMIT = "A force on trocar or tip passed its limit."
+    TORQUE_RATE_LIMIT = "The commanded torque changed faster than the arm's interface takes."
     INFEASIBLE = "The controller found no command that meets its hard constraints."

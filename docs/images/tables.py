@@ -96,7 +96,7 @@ def by_scenario(suite: str, controller: str, columns: Sequence[Column]) -> str:
 
 
 def _theatre(arm: str) -> str:
-    scenario = f"theatre_{arm}"
+    scenario = f"theatre_ideal_{arm}"
     columns = [
         Column(heading="tip RMS, mean", metric="tip_error_rms_mm"),
         Column(heading="tip RMS, worst", metric="tip_error_rms_mm", of=np.max),
@@ -105,7 +105,7 @@ def _theatre(arm: str) -> str:
         Column(heading="RCM max, worst", metric="rcm_error_max_mm", of=np.max),
         Column(heading="wall force RMS, mean [N]", metric="trocar_force_rms_n"),
     ]
-    return by_controller("theatre", {scenario: columns}, (scenario, "rcm_error_rms_mm"))
+    return by_controller("theatre_ideal", {scenario: columns}, (scenario, "rcm_error_rms_mm"))
 
 
 def _theatre_short() -> str:
@@ -145,8 +145,8 @@ FORCE = (("force RMS [N]", "trocar_force_rms_n"), ("max [N]", "trocar_force_max_
 TABLES: dict[str, Callable[[], str]] = {
     "nominal": _nominal,
     "theatre_short": _theatre_short,
-    "theatre_lwr4plus": lambda: _theatre("lwr4plus"),
-    "theatre_panda": lambda: _theatre("panda"),
+    "theatre_ideal_lwr4plus": lambda: _theatre("lwr4plus"),
+    "theatre_ideal_panda": lambda: _theatre("panda"),
     "breathing_tracked": lambda: _breathing("tracked", RCM),
     "breathing_hidden": lambda: _breathing("hidden", FORCE),
 }

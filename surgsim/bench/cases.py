@@ -8,7 +8,7 @@ from surgsim.scenario.load import load_scenario, shipped
 from surgsim.scenario.schema import Scenario
 
 CIRCLE = "circle_lwr4plus"
-WHOLE = ("theatre_lwr4plus", "teleop_free_motion_panda")
+WHOLE = ("theatre_lwr4plus", "theatre_ideal_lwr4plus", "teleop_free_motion_panda")
 """Scenarios that are measured with their own controller."""
 KINEMATIC = ("pinv", "gradient", "vprnn", "qp")
 """Controllers that are measured on the kinematic plant too."""

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from surgsim.models.build import JointLimits, Scene, build_arm
 from surgsim.models.config import SceneConfig
+from surgsim.models.drive import Drive
 from surgsim.spatial import cross
 from surgsim.tick.arrays import Model
 
@@ -70,6 +71,8 @@ class ArmModel:
         self._tip, self._rotation = data.site_xpos[site], data.site_xmat[site].reshape(3, 3)
         self._axes, self._anchors = data.xaxis, data.xanchor
         self._held: list[mujoco.MjData] = []
+        drives = config.robot.drives
+        self._drive = None if drives is None else drives.values(self._model.nv)
 
     @property
     def scene(self) -> Scene:
@@ -85,6 +88,11 @@ class ArmModel:
     def damping(self) -> Array:
         """Viscous joint damping of the nominal model (n,) [N m s/rad]."""
         return np.array(self._model.dof_damping, dtype=float)
+
+    @property
+    def drive(self) -> Drive | None:
+        """What is known of the joints' drives; None where they are ideal."""
+        return self._drive
 
     @cached_property
     def rolls_shaft(self) -> bool:

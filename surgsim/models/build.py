@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from surgsim.models.collision import CollisionShapes, collision_shapes
 from surgsim.models.config import RobotConfig, SceneConfig, WallConfig
+from surgsim.models.drive import DriveConfig
 from surgsim.models.graft import graft
 from surgsim.models.instrument import attach_instrument
 from surgsim.models.robot import JointLimits, home_of, joint_names, motor_names, robot_spec
@@ -113,7 +114,16 @@ def build_arm(config: SceneConfig) -> Scene:
     spec = mujoco.MjSpec()
     spec.compiler.discardvisual = True
     _add_arm(spec, config)
+    if config.robot.drives is not None:
+        _appear(spec, config.robot.drives)
     return _compile(spec, config.model_copy(update={"trocar": None}))
+
+
+def _appear(spec: mujoco.MjSpec, drives: DriveConfig) -> None:
+    """The joints' armature is the inertia with which the torque loops let the motors appear."""
+    names = joint_names(spec)
+    for name, inertia in zip(names, drives.values(len(names)).apparent_inertia, strict=True):
+        spec.joint(name).armature = inertia
 
 
 def _add_arm(spec: mujoco.MjSpec, config: SceneConfig) -> None:

@@ -28,6 +28,7 @@ from surgsim.models.adopted.config import Vec3 as Vec3
 from surgsim.models.adopted.file import checked_sha256
 from surgsim.models.adopted.problem import AdoptionError
 from surgsim.models.adopted.tool import Tool, read_tool
+from surgsim.models.drive import DriveConfig, real_drive
 from surgsim.models.folders import is_shipped, known_robot, robot_file, with_literal_variant
 
 
@@ -50,12 +51,15 @@ class RobotConfig(ArmFileConfig):
         base_yaw_rad: Turn of the base about the vertical [rad].
         dh_variant: `literal` takes d2 as Table 3 of the manipulability paper prints it, a misprint: for
             studies of that paper and its arm alone.
+        drive: `ideal`: the commanded torque acts on the joint. `real`: through motors, elastic gears and
+            torque loops as the robot's folder states them; or a mapping of what is to be otherwise.
     """
 
     name: RobotName | None = None
     base_position_m: Vec3 = (0.0, 0.0, 0.0)
     base_yaw_rad: FiniteFloat = 0.0
     dh_variant: Literal["standard", "literal"] = "standard"
+    drive: Literal["ideal", "real"] | DriveConfig = "ideal"
 
     @model_validator(mode="after")
     def _is_one_arm(self) -> Self:
@@ -72,7 +76,23 @@ class RobotConfig(ArmFileConfig):
         if self.name is None or not is_shipped(self.name):
             with placed_errors():
                 self._read_file()
+        if self.drive != "ideal":
+            self._complete_drive()
         return self
+
+    def _complete_drive(self) -> None:
+        """Fill in what the robot's folder says of its drives."""
+        try:
+            own = None if self.name is None else real_drive(robot_file(self.name).parent)
+            given = DriveConfig() if isinstance(self.drive, str) else self.drive
+            object.__setattr__(self, "drive", given.on(own))  # frozen, but still being made
+        except ValueError as error:
+            raise PydanticCustomError("placed", "{text}", {"text": str(error), "at": ("drive",)}) from error
+
+    @property
+    def drives(self) -> DriveConfig | None:
+        """Its drives; None where they are ideal."""
+        return None if isinstance(self.drive, str) else self.drive
 
     def _read_file(self) -> None:
         """Fill in the file's whole path and the hash of what it holds, and see that it is an arm."""

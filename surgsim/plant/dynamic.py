@@ -321,7 +321,8 @@ class DynamicPlant:
                     part, kind, self._scene, self._data, self.world, partial(self._own_slice, number)
                 )
             if kernel is not None or call is not None:
-                found.append(Hook(kind=kind, part=number, rank=part.rank, kernel=kernel, call=call))
+                rank = part.ranks.get(name, part.rank)
+                found.append(Hook(kind=kind, part=number, rank=rank, kernel=kernel, call=call))
         return found
 
     def _own_slice(self, part: int) -> Array:

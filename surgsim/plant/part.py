@@ -41,6 +41,7 @@ class PlantPart:
         columns: What it adds to the trace.
         touches_tip: Whether it can press on the instrument's tip, so that the force there is measured.
         rank: Where it stands in the chains of `actuate` and `sense`: lower first, then as in the scenario.
+        ranks: The same by the hook's name, where it differs.
         kernels: Compiled hooks by name, which stand for the methods of that name:
             status = hook(gains, world, memory, out), with the time of a physics step in `world.step_s` and
             `out` for `values`.
@@ -51,6 +52,7 @@ class PlantPart:
     columns: tuple[Block, ...] = ()
     touches_tip: bool = False
     rank: int = 0
+    ranks: Mapping[str, int] = {}
     kernels: Mapping[str, Any] = {}
     gains: Array = np.zeros(0)
     memory: Array = np.zeros(0)

@@ -7,14 +7,17 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 
 import numpy as np
 from pydantic import Field, NonNegativeInt, PositiveFloat, model_validator
+from pydantic_core import PydanticCustomError
 
 from surgsim.catalog import Name, PartConfig
 from surgsim.control.controller import ControllerConfig
 from surgsim.models.config import KINDS, InstrumentConfig, PerJoint, RobotConfig, SceneConfig, TrocarConfig
+from surgsim.models.robot import robot_joints
 from surgsim.plant import DEFAULT, PLANTS
 from surgsim.plant.base import PlantConfig
 from surgsim.plant.disturbances import DISTURBANCES
 from surgsim.plant.disturbances.base import DisturbanceConfig
+from surgsim.plant.drive import JointDrives
 from surgsim.plant.part import PlantPart, PlantPartConfig
 from surgsim.plant.props import PROPS
 from surgsim.scenario.per_joint import check_lists
@@ -158,6 +161,12 @@ class Scenario(PartConfig):
     @model_validator(mode="after")
     def _fits_the_arm(self) -> Self:
         check_lists(self, self.robot)
+        if self.robot.drives is not None:
+            try:
+                self.robot.drives.check_lengths(robot_joints(self.robot))
+            except ValueError as error:
+                placed = {"text": str(error), "at": ("robot", "drive")}
+                raise PydanticCustomError("placed", "{text}", placed) from error
         return self
 
     @model_validator(mode="after")
@@ -172,6 +181,8 @@ class Scenario(PartConfig):
             raise ValueError("give task.start_m, or start.q_rad where the path then begins")
         if self.plant.uses_torque and self.controller.torque_law is None:
             raise ValueError(f"plant '{self.plant.type}' needs controller.torque_law")
+        if self.robot.drives is not None and not self.plant.uses_torque:
+            raise ValueError(f"robot.drive does not act on the '{self.plant.type}' plant: leave it ideal")
         for key in ("disturbances", "props"):
             if getattr(self, key) and not self.plant.uses_torque:
                 raise ValueError(f"{key} do not act on the '{self.plant.type}' plant: leave them out")
@@ -209,11 +220,13 @@ class Scenario(PartConfig):
         )
 
     def build_parts(self) -> list[PlantPart]:
-        """Disturbances, then props, each with values drawn from its own child of the seed."""
+        """Disturbances, props, then the drives, each with values drawn from its own child of the seed."""
         configs: tuple[PlantPartConfig, ...] = (*self.disturbances, *self.props)
-        children = np.random.SeedSequence(self.seed, spawn_key=(0,)).spawn(len(configs))
-        pairs = zip(configs, children, strict=True)
-        return [config.build(np.random.default_rng(child)) for config, child in pairs]
+        children = np.random.SeedSequence(self.seed, spawn_key=(0,)).spawn(len(configs) + 1)
+        pairs = zip(configs, children, strict=False)
+        parts = [config.build(np.random.default_rng(child)) for config, child in pairs]
+        drives = self.robot.drives
+        return parts if drives is None else [*parts, JointDrives(drives, np.random.default_rng(children[-1]))]
 
     def run_seed(self) -> np.random.SeedSequence:
         """Where the randomness during a run comes from."""

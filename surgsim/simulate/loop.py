@@ -43,7 +43,7 @@ from surgsim.tasks.base import TipCommand
 from surgsim.tasks.binding import BoundTask
 from surgsim.tasks.command import command_of
 from surgsim.tick.arrays import Control, Record, World, new, point
-from surgsim.tick.status import GOES_ON
+from surgsim.tick.status import GOES_ON, TORQUE_RATE
 from surgsim.trace.trace import Ending, Trace, TraceMeta, base_blocks
 
 Array = NDArray[np.float64]
@@ -216,6 +216,9 @@ class Simulation:
             return Ending(outcome=Outcome.COMPLETED, t_s=t_s)
         if reason == TASK_TOLD:
             raise self._task.raised() or self._stopped(self._setup.scenario.task.type)
+        if int(self._run.progress.status) == TORQUE_RATE:
+            detail = f"the command at {t_s:.3f} s asks for more than robot.drive's torque_rate_nm_per_s"
+            return Ending(outcome=Outcome.TORQUE_RATE_LIMIT, t_s=t_s, detail=detail)
         raise self._setup.plant.hooks.raised() or self._stopped("a disturbance or prop")
 
     def _stopped(self, who: str) -> SurgsimError:

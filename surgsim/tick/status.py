@@ -9,3 +9,5 @@ DIVERGED = 3
 """A state of the part has grown past all bounds."""
 TOLD = 4
 """A Python part says why itself (`surgsim.tick.python_part`)."""
+TORQUE_RATE = 5
+"""The commanded torque changes faster than the arm's interface takes."""

@@ -261,6 +261,11 @@ def test_the_full_suite_leaves_nothing_out():
     paths = [name for name in paths if name.endswith(compared)]
     assert sorted(suite.scenarios) == sorted(paths)
     elsewhere = {"passive_convex", "rcm_interaction_force"}  # made for an operator, and for a wall
+    elsewhere |= {
+        "rcm_elastic_dynamics",
+        "joint_elastic_dynamics",
+        "joint_impedance_tuned",
+    }  # for real drives
     assert set(suite.controllers) == set(shipped("controllers")) - elsewhere
     assert len(expand(suite, folder)) == 3600
     assert len(expand(*load_suite("seeds"))) == 240

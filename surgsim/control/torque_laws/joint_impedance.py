@@ -4,6 +4,7 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import PositiveFloat
 
 from surgsim.catalog import PartConfig
 from surgsim.compiled import compiled
@@ -27,11 +28,15 @@ class JointImpedanceConfig(PartConfig):
         stiffness_nm_per_rad: K, diagonal; null: from 2000 at the base to 200 at the flange, read off at the
             arm's joints, within what torque-controlled arms offer (5000 at most).
         damping_nm_s_per_rad: D, diagonal; null: likewise, from 60 to 6.
+        stiffness_factor: K is so many times that.
+        damping_factor: D is so many times that.
     """
 
     type: Literal["joint_impedance"] = "joint_impedance"
     stiffness_nm_per_rad: PerJoint | None = None
     damping_nm_s_per_rad: PerJoint | None = None
+    stiffness_factor: PositiveFloat = 1.0
+    damping_factor: PositiveFloat = 1.0
 
     def build(self, arm: ArmModel) -> KernelTorqueLaw:
         """The law; gains K (n,), D (n,).
@@ -42,7 +47,7 @@ class JointImpedanceConfig(PartConfig):
         n = arm.limits.q_min.size
         stiffness = for_joints("stiffness_nm_per_rad", self.stiffness_nm_per_rad, STIFFNESS, n)
         damping = for_joints("damping_nm_s_per_rad", self.damping_nm_s_per_rad, DAMPING, n)
-        gains = np.concatenate((stiffness, damping))
+        gains = np.concatenate((self.stiffness_factor * stiffness, self.damping_factor * damping))
         return KernelTorqueLaw(kernel=joint_impedance, arm=arm, terms=("joint", "bias"), gains=gains)
 
 

@@ -1,0 +1,84 @@
+"""RCM inverse dynamics on elastic drives: RCM over tip over posture, links and motors observed apart."""
+
+import math
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import NonNegativeFloat, PositiveFloat
+
+from surgsim.compiled import compiled
+from surgsim.control.elastic_observer import DELAY, ElasticObserverConfig, look_ahead, send
+from surgsim.control.torque_laws.base import KernelTorqueLaw
+from surgsim.control.torque_laws.rcm_hierarchy import HIERARCHY_GAINS, LIMITS, TERMS, fill_terms
+from surgsim.models.arm import ArmModel
+from surgsim.tick.arrays import Seen
+from surgsim.tick.scratch import scratch
+from surgsim.tick.status import GOES_ON, INFEASIBLE
+
+Array = NDArray[np.float64]
+
+
+class RcmElasticDynamicsConfig(ElasticObserverConfig):
+    """Inverse dynamics of RCM, tip and posture in strict priority, for arms with elastic drives.
+
+    Attributes:
+        bandwidth_share: Natural frequency of the RCM error's second-order dynamics, over the lowest
+            sqrt(K / B_s) of the drives.
+        most_bandwidth_rad_per_s: It is at most this [rad/s].
+        tip_bandwidth_ratio: The tip's bandwidth over the RCM's.
+        joint_bandwidth_rad_per_s: About the joint reference in the remaining null space [rad/s].
+        damping_ratio: Of RCM and tip.
+    """
+
+    type: Literal["rcm_elastic_dynamics"] = "rcm_elastic_dynamics"
+    bandwidth_share: PositiveFloat = 0.44
+    most_bandwidth_rad_per_s: PositiveFloat = 85.0
+    tip_bandwidth_ratio: PositiveFloat = 1.0
+    joint_bandwidth_rad_per_s: NonNegativeFloat = 10.0
+    damping_ratio: PositiveFloat = 0.7
+
+    def build(self, arm: ArmModel) -> KernelTorqueLaw:
+        """The law; its memory is the observer's."""
+        numbers = self.numbers(arm)
+        rcm = min(self.bandwidth_share * locked_frequency(arm), self.most_bandwidth_rad_per_s)
+        tip, joint, ratio = self.tip_bandwidth_ratio * rcm, self.joint_bandwidth_rad_per_s, self.damping_ratio
+        pairs = [(w * w, 2.0 * zeta * w) for w, zeta in ((rcm, ratio), (tip, ratio), (joint, 1.0))]
+        return KernelTorqueLaw(
+            kernel=rcm_elastic_dynamics,
+            arm=arm,
+            terms=TERMS,
+            gains=np.concatenate([*pairs, (0.0, 0.0), numbers]),
+            memory_size=self.memory_size(arm.limits.torque.size),
+            failures={INFEASIBLE: "no joint acceleration keeps all limits"},
+        )
+
+
+def locked_frequency(arm: ArmModel) -> float:
+    """The lowest sqrt(K / B_s) of an arm's drives [rad/s], a motor on its gear; infinite if ideal."""
+    if arm.drive is None:
+        return math.inf
+    return float(np.sqrt(arm.drive.stiffness / arm.drive.apparent_inertia).min())
+
+
+@compiled
+def rcm_elastic_dynamics(gains: Array, seen: Seen, memory: Array, out: Array) -> int:
+    """U = (M + B_s) q'' + c + D_l v - d + f, at the state predicted for when the torque will act.
+
+    `surgsim.control.elastic_observer` gives that state, d and f; the accelerations are those of the hierarchy
+    of `rcm_inverse_dynamics`, weighted with M + B_s: what a torque behind the torque loop moves below its
+    bandwidth. The command changes no faster than the arm's interface takes.
+
+    Rows tip, rcm, joint, bias, observer, limits (6, n) [N m].
+
+    Source: ours; that links and motors move as one below the drives' bandwidth is the slow part of singular
+    perturbation, Spong, Khorasani and Kokotovic, IEEE J. Robotics and Automation 3:294 (1987).
+    """
+    numbers, d = gains[HIERARCHY_GAINS:], scratch(seen.q.size)
+    status = look_ahead(numbers, seen, memory, d)
+    if status != GOES_ON:
+        return status
+    status = fill_terms(gains, seen, seen.elsewhere, numbers[DELAY] * seen.dt_s, d, 1.0, out)
+    if status == GOES_ON:
+        send(numbers, seen, memory, out, LIMITS)
+    return status

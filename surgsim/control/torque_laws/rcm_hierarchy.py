@@ -1,0 +1,142 @@
+"""The hierarchy of the laws of inverse dynamics: RCM over tip over posture, at acceleration level."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from surgsim.compiled import compiled
+from surgsim.control.acceleration import TORQUE_SHARE, allows, fill_acceleration_bounds, prioritised
+from surgsim.control.manipulability import fill_velocity_products
+from surgsim.control.rcm import fill_rcm, fill_rcm_bias
+from surgsim.tick.algebra import (
+    back_substitute,
+    back_substitute_rows,
+    dot,
+    factor,
+    outer_product,
+    times,
+    transposed_times,
+)
+from surgsim.tick.arrays import Model, Seen
+from surgsim.tick.scratch import scratch, scratch_matrix
+from surgsim.tick.status import GOES_ON, RANK_LOST
+
+Array = NDArray[np.float64]
+K_RCM, D_RCM, K_TIP, D_TIP, K_JOINT, D_JOINT, SENSOR_DELAY, YIELDS = range(8)
+"""Places of the gains, with which those of a law begin. The first six go with the bandwidth squared, or with
+the bandwidth, in turn."""
+HIERARCHY_GAINS = 8
+TIP, RCM, JOINT, BIAS, DISTURBANCE, LIMITS = range(6)
+"""Rows of the terms."""
+TERMS = ("tip", "rcm", "joint", "bias", "observer", "limits")
+
+
+@compiled
+def _task_accelerations(
+    gains: Array, seen: Seen, model: Model, late: float, share: float, J: Array, a: Array
+) -> None:
+    """Fill rows J (m, n) and accelerations a (m,) of tip and RCM at `model`'s state, `late` [s] from now."""
+    linear, angular, rate = scratch(3), scratch(3), scratch(3)
+    fill_velocity_products(model.Jv_WT, model.z_W, model.v, linear, angular)
+    ahead = max(late - gains[SENSOR_DELAY], 0.0)
+    times(model.Jv_WT, model.v, rate)
+    square = share * share
+    for i in range(3):
+        J[i] = model.Jv_WT[i]
+        p_d = seen.p_WTd[i] + ahead * (seen.v_WTd[i] + 0.5 * ahead * seen.a_WTd[i])
+        v_d = seen.v_WTd[i] + ahead * seen.a_WTd[i]
+        pull = square * gains[K_TIP] * (p_d - model.p_WT[i]) + share * gains[D_TIP] * (v_d - rate[i])
+        a[i] = seen.a_WTd[i] - linear[i] + pull
+    if a.size == 3:
+        return
+    p_WC, v_WC = scratch(3), scratch(3)
+    for i in range(3):
+        p_WC[i] = seen.p_WC[i] + late * (seen.v_WC[i] + 0.5 * late * seen.a_WC[i])
+        v_WC[i] = seen.v_WC[i] + late * seen.a_WC[i]
+    error, moving, bias = scratch(2), scratch(2), scratch(2)
+    normals = scratch_matrix(2, 3)
+    fill_rcm(model.p_WT, model.R_WT, model.Jv_WT, model.Jw_WT, p_WC, v_WC, error, J[3:], moving, normals)
+    fill_rcm_bias(
+        model.p_WT, model.R_WT, model.Jv_WT, model.Jw_WT, model.v, p_WC, v_WC, linear, angular, bias
+    )
+    for i in range(2):
+        e_dot = dot(J[3 + i], model.v) - moving[i]
+        pull = square * gains[K_RCM] * error[i] + share * gains[D_RCM] * e_dot
+        a[3 + i] = dot(normals[i], seen.a_WC) - bias[i] - pull
+
+
+@compiled
+def _give_way(A: Array, f: Array, a: Array) -> bool:
+    """Add to `a` the acceleration of the tip along the force `f` on it, the further rows held.
+
+    A is the Cholesky factor of J M^-1 J^T (m, m).
+    """
+    m, size = A.shape[0], dot(f, f)
+    if size == 0.0:
+        return True
+    inverse, held, moved = scratch_matrix(m, m), scratch_matrix(3, 3), scratch(3)
+    for i in range(m):
+        for j in range(m):
+            inverse[i, j] = 1.0 if i == j else 0.0
+    back_substitute_rows(A, inverse)
+    held[:], moved[:] = inverse[:3, :3], f
+    if not factor(held):
+        return False
+    back_substitute(held, moved)
+    share = dot(f, moved) / size
+    for i in range(3):
+        a[i] += f[i] * share
+    return True
+
+
+@compiled
+def fill_terms(
+    gains: Array, seen: Seen, model: Model, late: float, d: Array, share: float, out: Array
+) -> int:
+    """Fill the terms of the torque for the state of `model`, which is reached `late` [s] from now."""
+    n, m, M = seen.q.size, 3 + seen.rows, model.M
+    J, a, posture = scratch_matrix(m, n), scratch(m), scratch(n)
+    _task_accelerations(gains, seen, model, late, share, J, a)
+    ahead = max(late - gains[SENSOR_DELAY], 0.0)
+    for i in range(n):
+        gap = seen.q_ref[i] + ahead * seen.qdot_ref[i] - model.q[i]
+        turning = share * gains[D_JOINT] * (seen.qdot_ref[i] - model.v[i])
+        posture[i] = share * share * gains[K_JOINT] * gap + turning
+    L, Y, A, force = scratch_matrix(n, n), scratch_matrix(m, n), scratch_matrix(m, m), scratch(m)
+    L[:], Y[:] = M, J
+    if not factor(L):
+        return RANK_LOST
+    back_substitute_rows(L, Y)
+    outer_product(J, Y, A)
+    if not factor(A):
+        return RANK_LOST
+    if gains[YIELDS] != 0.0 and not _give_way(A, seen.f_T, a):
+        return RANK_LOST
+    times(J, posture, force)
+    for i in range(m):
+        force[i] = a[i] - force[i]
+    back_substitute(A, force)
+    transposed_times(J[:3], force[:3], out[TIP])
+    transposed_times(J[3:], force[3:], out[RCM])
+    times(M, posture, out[JOINT])
+    qddot, constant, torque, most = scratch(n), scratch(n), scratch(n), scratch(n)
+    transposed_times(Y, force, qddot)
+    for i in range(n):
+        qddot[i] += posture[i]
+        out[BIAS, i] = model.bias[i] + seen.damping[i] * model.v[i]
+        out[DISTURBANCE, i] = -d[i]
+        out[LIMITS, i] = 0.0
+        constant[i] = out[BIAS, i] - d[i]
+        most[i] = TORQUE_SHARE * seen.tau_max[i]
+    times(M, qddot, torque)
+    for i in range(n):
+        torque[i] += constant[i]
+    if allows(torque, most, qddot, seen, model.q, model.v):
+        return GOES_ON
+    low, high, kept = scratch(n), scratch(n), scratch(n)
+    fill_acceleration_bounds(seen, model.q, model.v, low, high)
+    status = prioritised(M, constant, J, a, posture, low, high, most, kept)
+    if status == GOES_ON:
+        for i in range(n):
+            kept[i] -= qddot[i]
+        times(M, kept, out[LIMITS])
+    return status

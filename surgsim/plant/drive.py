@@ -1,0 +1,432 @@
+"""The drives of the joints as the plant has them: motors behind elastic gears, with their torque loops.
+
+MuJoCo moves the links; their joints have no armature, and are driven by the torques of the gears. Over a
+physics step the arm's inertia, and all forces on it but those, are taken as they are at its beginning; motors
+and links are then integrated together, in substeps of the torque loop's own period and by the trapezoidal
+rule. What the gears, less the links' damping, gave on average over the step is handed to MuJoCo, which steps
+the links; they end where both integrations say:
+
+    v+ = v + h M^-1 (mean tau_J + other forces),    q+ = q + h v+ + (x - q - h v_x)
+
+with x, v_x the links' motion by the substeps, and M^-1 as MuJoCo's integrator has it. The gears may thus be
+as stiff, and the links as light, as they are: nothing of it limits the physics step.
+
+    beta = B / h_s,  kappa = K h_s / 4 + D / 2                           of each joint, h_s the substep
+    tau_J = K s + kappa (w + w+ - v - v+),  s+ = s + h_s (w + w+ - v - v+) / 2
+    beta (w+ - w) = tau_m - tau_J - tau_f
+    M (v+ - v) / h_s = r + tau_J - D_l (v + v+) / 2
+
+are solved for v+ with one Cholesky factor a step. Dry friction holds a motor that it can hold: tau_f is what
+brings w+ to rest, or, where that is more than the friction is, the friction against the motion.
+
+Drives: `surgsim.models.drive`.
+"""
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from surgsim.columns import joints, scalar
+from surgsim.compiled import compiled
+from surgsim.models.build import Scene
+from surgsim.models.drive import DriveConfig
+from surgsim.models.robot import joint_names, motor_names
+from surgsim.plant.part import PlantPart
+from surgsim.tick.algebra import back_substitute, factor
+from surgsim.tick.arrays import Record, World
+from surgsim.tick.mujoco_calls import mj_fullM
+from surgsim.tick.overlay import laid_over, overlay
+from surgsim.tick.scratch import scratch, scratch_matrix
+from surgsim.tick.status import GOES_ON, RANK_LOST, TORQUE_RATE
+from surgsim.tick.views import vector
+
+Array = NDArray[np.float64]
+LOOP_S = 1e-4
+"""Period of the torque loop, and longest substep [s]."""
+MOST_DELAY = 20
+"""Longest delay of the torque loop in its periods."""
+LAST = 10
+"""Rank in the chain of `actuate`: what arrives at the drives."""
+_BEFORE_ALL = -1
+CLIP, STOP, IGNORE = range(3)
+
+
+class Law(Record):
+    """Numbers of the drives; after it in the gains the rows of `STIFFNESS` and so on (n,).
+
+    Attributes:
+        passive: Address of `qfrc_passive`; as the following four of MuJoCo's arrays.
+        smooth: Of `qfrc_smooth`.
+        actuator: Of `qfrc_actuator`.
+        constraint: Of `qfrc_constraint`.
+        substeps: Of a physics step.
+        delay: Of the torque loop, in substeps.
+        past_rate: What becomes of a torque that changes too fast.
+        at_motor: Whether joints are measured on the motor's side.
+        h: Physics step [s].
+        ratio: B / B_s.
+        keep: Share of the motor's torque that is kept over a substep, exp(-2 pi f h_s).
+        observes: Share of the unexplained torque that the friction observer takes in a substep.
+        stribeck: Stribeck velocity [rad/s].
+        waves: Ripple's periods a radian [1/rad].
+        rate: Fastest change of the command in a tick [N m].
+        command_keep: Share of the command that the interface's low-pass keeps over a tick.
+    """
+
+    passive: int
+    smooth: int
+    actuator: int
+    constraint: int
+    substeps: int
+    delay: int
+    past_rate: int
+    at_motor: int
+    h: float
+    ratio: float
+    keep: float
+    observes: float
+    stribeck: float
+    waves: float
+    rate: float
+    command_keep: float
+
+
+class Account(Record):
+    """Beginning of the memory: energies since the start [J], and what was told; after it the rows (n,).
+
+    Attributes:
+        told: Whether a torque that changed too fast was told.
+        work: Of the motors' torques.
+        loss: In friction, ripple and gears.
+        given: To the links.
+        stored_at_start: In gears and rotors.
+    """
+
+    told: int
+    work: float
+    loss: float
+    given: float
+    stored_at_start: float
+
+
+LAW, LAW_SIZE = overlay(Law)
+ACCOUNT, ACCOUNT_SIZE = overlay(Account)
+STIFFNESS, GEAR, ROTOR, LOOP, COULOMB, STATIC, VISCOUS, RIPPLE, BIAS, WAVE, LINK_DAMPING = range(11)
+"""Rows of the gains: K, D, B, D_s, friction, ripple, the torque sensor's bias and ripple, links' damping."""
+THETA, OMEGA, MOTOR, COMMAND, OTHERS, FRICTION, MOVED = range(7)
+"""Rows of the memory: motor's position and speed, its torque, the command that acts, other forces on the
+links, friction as observed, the links' correction of a step."""
+_ROWS = 7
+"""After them the sensed torques and gear speeds of the last substeps (MOST_DELAY, 2, n), and the inertia."""
+
+
+@compiled
+def _row(array: Array, begin: int, row: int, n: int) -> Array:
+    return array[begin + row * n : begin + (row + 1) * n]
+
+
+@compiled
+def receive(gains: Array, world: World, memory: Array, out: Array) -> int:
+    """What the interface makes of the command: its low-pass, then its limit of the torque's rate."""
+    law, account, n = gains[:LAW_SIZE].view(LAW)[0], memory[:ACCOUNT_SIZE].view(ACCOUNT)[0], world.q.size
+    acting = _row(memory, ACCOUNT_SIZE, COMMAND, n)
+    status = GOES_ON
+    for i in range(n):
+        wanted = law.command_keep * acting[i] + (1.0 - law.command_keep) * world.torque[i]
+        if law.past_rate == CLIP:
+            wanted = min(max(wanted, acting[i] - law.rate), acting[i] + law.rate)
+        elif law.past_rate == STOP and abs(wanted - acting[i]) > law.rate * (1.0 + 1e-9) and not account.told:
+            status = TORQUE_RATE
+        acting[i] = world.torque[i] = wanted
+    if status != GOES_ON:
+        account.told = 1
+    return status
+
+
+@compiled
+def move(gains: Array, world: World, memory: Array, out: Array) -> int:
+    """Integrate motors and links over a physics step; MuJoCo's motors are given the gears' mean torques."""
+    law, n, nv, first = gains[:LAW_SIZE].view(LAW)[0], world.q.size, world.nv, world.first_dof
+    whole = memory[ACCOUNT_SIZE + (_ROWS + 2 * MOST_DELAY) * n :].reshape(nv, nv)
+    mj_fullM(world.mj_model, world.mj_data, whole.ctypes.data)
+    K, D = _row(gains, LAW_SIZE, STIFFNESS, n), _row(gains, LAW_SIZE, GEAR, n)
+    B, damping = _row(gains, LAW_SIZE, ROTOR, n), _row(gains, LAW_SIZE, LINK_DAMPING, n)
+    others, moved = _row(memory, ACCOUNT_SIZE, OTHERS, n), _row(memory, ACCOUNT_SIZE, MOVED, n)
+    qpos, qvel = vector(world.qpos, world.nq), vector(world.qvel, nv)
+    bias, passive = vector(world.qfrc_bias, nv), vector(law.passive, nv)
+    x, v, rest, mean, gain = scratch(n), scratch(n), scratch(n), scratch(n), scratch(n)
+    M, S, hs = scratch_matrix(n, n), scratch_matrix(n, n), law.h / law.substeps
+    for i in range(n):
+        x[i], v[i] = qpos[world.first_qpos + i], qvel[first + i]
+        rest[i] = passive[first + i] - bias[first + i] + others[i]
+        mean[i] = gain[i] = 0.0
+        for j in range(n):
+            M[i, j] = S[i, j] = whole[first + i, first + j] / hs
+        beta, kappa = B[i] / hs, 0.25 * K[i] * hs + 0.5 * D[i]
+        S[i, i] += 0.5 * damping[i] + kappa * beta / (beta + kappa)
+    if not factor(S):
+        return RANK_LOST
+    for _ in range(law.substeps):
+        _close_loop(gains, law, memory, x, v)
+        _substep(gains, law, memory, M, S, rest, x, v, gain, mean)
+    ctrl = vector(world.ctrl, world.first_ctrl + n)
+    for i in range(n):
+        ctrl[world.first_ctrl + i] = mean[i] / law.substeps
+        moved[i] = x[i] - qpos[world.first_qpos + i] - law.h * v[i]
+    return GOES_ON
+
+
+@compiled
+def _substep(
+    gains: Array,
+    law: Law,
+    memory: Array,
+    M: Array,
+    S: Array,
+    rest: Array,
+    x: Array,
+    v: Array,
+    gain: Array,
+    mean: Array,
+) -> None:
+    """One substep of motors and links.
+
+    Args:
+        gains: Numbers of the drives.
+        law: Their beginning.
+        memory: Of the drives, changed.
+        M: Inertia of the links over the substep (n, n).
+        S: Cholesky factor of the equation for v+ (n, n).
+        rest: Other forces on the links (n,) [N m].
+        x: Positions of the links (n,) [rad], changed.
+        v: Velocities of the links (n,) [rad/s], changed.
+        gain: What the links' velocities gained in the last substep (n,) [rad/s], changed.
+        mean: Sum of the torques that act on the links (n,) [N m], added to.
+    """
+    account, n, hs = memory[:ACCOUNT_SIZE].view(ACCOUNT)[0], x.size, law.h / law.substeps
+    K, D = _row(gains, LAW_SIZE, STIFFNESS, n), _row(gains, LAW_SIZE, GEAR, n)
+    B, damping = _row(gains, LAW_SIZE, ROTOR, n), _row(gains, LAW_SIZE, LINK_DAMPING, n)
+    theta, omega = _row(memory, ACCOUNT_SIZE, THETA, n), _row(memory, ACCOUNT_SIZE, OMEGA, n)
+    motor, known = _row(memory, ACCOUNT_SIZE, MOTOR, n), _row(memory, ACCOUNT_SIZE, FRICTION, n)
+    push, turn, after = scratch(n), scratch(n), scratch(n)
+    for i in range(n):
+        beta, kappa = B[i] / hs, 0.25 * K[i] * hs + 0.5 * D[i]
+        slip, spring = omega[i] - v[i], K[i] * (theta[i] - x[i])
+        free = beta * omega[i] + motor[i] - spring - kappa * slip
+        # a motor that stands is held against what would move it, the link going on as in the last substep
+        turn[i] = _friction(gains, law, n, i, theta[i], omega[i], free + kappa * (v[i] + gain[i]))
+        push[i] = free - turn[i]
+        momentum = 0.0
+        for j in range(n):
+            momentum += M[i, j] * v[j]
+        after[i] = momentum + rest[i] - 0.5 * damping[i] * v[i]
+        after[i] += spring + kappa * slip + kappa * push[i] / (beta + kappa)
+    back_substitute(S, after)
+    for i in range(n):
+        beta, kappa = B[i] / hs, 0.25 * K[i] * hs + 0.5 * D[i]
+        w = (push[i] + kappa * after[i]) / (beta + kappa)
+        torque = K[i] * (theta[i] - x[i]) + kappa * (omega[i] + w - v[i] - after[i])
+        speed, link = 0.5 * (omega[i] + w), 0.5 * (v[i] + after[i])
+        account.work += hs * motor[i] * speed
+        account.loss += hs * (turn[i] * speed + D[i] * (speed - link) * (speed - link))
+        account.given += hs * torque * link
+        mean[i] += torque - damping[i] * link
+        known[i] += law.observes * (motor[i] - torque - beta * (w - omega[i]) - known[i])
+        theta[i] += hs * speed
+        x[i] += hs * link
+        gain[i] = after[i] - v[i]
+        omega[i], v[i] = w, after[i]
+
+
+@compiled
+def _close_loop(gains: Array, law: Law, memory: Array, x: Array, v: Array) -> None:
+    """The torque loop: what it senses, and the motors' torques that follow after their lag."""
+    n, tail = x.size, ACCOUNT_SIZE + _ROWS * x.size
+    ring = memory[tail : tail + 2 * MOST_DELAY * n]
+    K, D = _row(gains, LAW_SIZE, STIFFNESS, n), _row(gains, LAW_SIZE, GEAR, n)
+    loop, bias, wave = (
+        _row(gains, LAW_SIZE, LOOP, n),
+        _row(gains, LAW_SIZE, BIAS, n),
+        _row(gains, LAW_SIZE, WAVE, n),
+    )
+    theta, omega = _row(memory, ACCOUNT_SIZE, THETA, n), _row(memory, ACCOUNT_SIZE, OMEGA, n)
+    motor, command = _row(memory, ACCOUNT_SIZE, MOTOR, n), _row(memory, ACCOUNT_SIZE, COMMAND, n)
+    known = _row(memory, ACCOUNT_SIZE, FRICTION, n)
+    for k in range(law.delay, 0, -1):
+        for i in range(2 * n):
+            ring[2 * n * k + i] = ring[2 * n * (k - 1) + i]
+    for i in range(n):
+        s, relative = theta[i] - x[i], omega[i] - v[i]
+        ring[i] = K[i] * s + D[i] * relative + bias[i] + wave[i] * math.sin(law.waves * theta[i])
+        ring[n + i] = relative
+    late = 2 * n * law.delay
+    for i in range(n):
+        wanted = law.ratio * (command[i] - loop[i] * ring[late + n + i])
+        wanted += (1.0 - law.ratio) * ring[late + i]
+        if law.observes > 0.0:
+            wanted += known[i]
+        motor[i] = law.keep * motor[i] + (1.0 - law.keep) * wanted
+
+
+@compiled
+def _friction(gains: Array, law: Law, n: int, i: int, theta: float, omega: float, free: float) -> float:
+    """Friction and ripple of a motor over a substep [N m]; `free` [N m] is what would have to be held."""
+    coulomb, static = gains[LAW_SIZE + COULOMB * n + i], gains[LAW_SIZE + STATIC * n + i]
+    smooth: float = gains[LAW_SIZE + VISCOUS * n + i] * omega
+    smooth += gains[LAW_SIZE + RIPPLE * n + i] * math.sin(law.waves * theta)
+    ratio = omega / law.stribeck
+    most = coulomb + (static - coulomb) * math.exp(-ratio * ratio)
+    dry: float = min(max(free - smooth, -most), most)
+    return smooth + dry
+
+
+@compiled
+def end_step(gains: Array, world: World, memory: Array, out: Array) -> int:
+    """After `mj_step2`: the links end where the substeps say; remember the other forces on them."""
+    law, n, nv, first = gains[:LAW_SIZE].view(LAW)[0], world.q.size, world.nv, world.first_dof
+    qpos, moved = vector(world.qpos, world.nq), _row(memory, ACCOUNT_SIZE, MOVED, n)
+    others = _row(memory, ACCOUNT_SIZE, OTHERS, n)
+    smooth, passive, bias = vector(law.smooth, nv), vector(law.passive, nv), vector(world.qfrc_bias, nv)
+    actuator, constraint = vector(law.actuator, nv), vector(law.constraint, nv)
+    for i in range(n):
+        at = first + i
+        qpos[world.first_qpos + i] += moved[i]
+        others[i] = smooth[at] - passive[at] + bias[at] - actuator[at] + constraint[at]
+    return GOES_ON
+
+
+@compiled
+def feel(gains: Array, world: World, memory: Array, out: Array) -> int:
+    """What is measured: the torques of the gears, and the joints on the side where the encoders sit."""
+    law, n = gains[:LAW_SIZE].view(LAW)[0], world.q.size
+    K, D = _row(gains, LAW_SIZE, STIFFNESS, n), _row(gains, LAW_SIZE, GEAR, n)
+    bias, wave = _row(gains, LAW_SIZE, BIAS, n), _row(gains, LAW_SIZE, WAVE, n)
+    theta, omega = _row(memory, ACCOUNT_SIZE, THETA, n), _row(memory, ACCOUNT_SIZE, OMEGA, n)
+    for i in range(n):
+        torque = K[i] * (theta[i] - world.q[i]) + D[i] * (omega[i] - world.v[i])
+        world.tau_m[i] = torque + bias[i] + wave[i] * math.sin(law.waves * theta[i])
+        if law.at_motor:
+            world.q_m[i], world.v_m[i] = theta[i], omega[i]
+    return GOES_ON
+
+
+@compiled
+def record(gains: Array, world: World, memory: Array, out: Array) -> int:
+    """Columns: the gears' torques, the motors' speeds, energies."""
+    account, n = memory[:ACCOUNT_SIZE].view(ACCOUNT)[0], world.q.size
+    K, D = _row(gains, LAW_SIZE, STIFFNESS, n), _row(gains, LAW_SIZE, GEAR, n)
+    B = _row(gains, LAW_SIZE, ROTOR, n)
+    theta, omega = _row(memory, ACCOUNT_SIZE, THETA, n), _row(memory, ACCOUNT_SIZE, OMEGA, n)
+    stored = -account.stored_at_start
+    for i in range(n):
+        s = theta[i] - world.q[i]
+        out[i] = K[i] * s + D[i] * (omega[i] - world.v[i])
+        out[n + i] = omega[i]
+        stored += 0.5 * (K[i] * s * s + B[i] * omega[i] * omega[i])
+    out[2 * n], out[2 * n + 1], out[2 * n + 2] = account.work, account.loss, stored
+    out[2 * n + 3] = account.given
+    return GOES_ON
+
+
+class JointDrives(PlantPart):
+    """The drives of an arm, as a part of the plant.
+
+    Records the gears' torques `joint_torque`, the motors' speeds `motor_speed`, and since the start the work
+    of the motors, their loss, the energy in rotors and gears, and that given to the links: work is the sum of
+    the other three.
+
+    Args:
+        config: The drives, whole: see `DriveConfig.on`.
+        rng: From which friction and the signs of the sensors' biases are drawn.
+    """
+
+    rank = LAST
+    kernels: Mapping[str, Any] = {
+        "actuate": receive,
+        "before_step": move,
+        "after_step": end_step,
+        "sense": feel,
+        "values": record,
+    }
+    ranks: Mapping[str, int] = {"before_step": -1, "after_step": -1, "sense": 0}
+
+    def __init__(self, config: DriveConfig, rng: np.random.Generator) -> None:
+        self._c, self._rng = config, rng
+        self._n, self._damping = 0, np.zeros(0)
+
+    def modify(self, spec: mujoco.MjSpec) -> None:
+        """The motors' inertia and the damping leave MuJoCo's joints, which bear whatever the gears give."""
+        names = joint_names(spec)
+        self._damping = np.array([np.ravel(spec.joint(name).damping)[0] for name in names])
+        for name in names:
+            spec.joint(name).armature = 0.0
+            spec.joint(name).damping = np.zeros_like(spec.joint(name).damping)
+        for name in motor_names(len(names)):
+            spec.actuator(name).ctrllimited = mujoco.mjtLimited.mjLIMITED_FALSE
+            spec.actuator(name).forcelimited = mujoco.mjtLimited.mjLIMITED_FALSE
+
+    def attach(self, scene: Scene, dt_s: float) -> None:
+        """Draw what differs from joint to joint, settle the numbers, make room for the memory."""
+        c, n = self._c, len(scene.dof_ids)
+        self._n = n
+        self.columns = (
+            joints("joint_torque", "nm", n),
+            joints("motor_speed", "rad_per_s", n),
+            *(scalar(f"drive_{name}", "j") for name in ("work", "loss", "stored", "given")),
+        )
+        drive, h = c.values(n), scene.model.opt.timestep
+        drawn = np.random.Generator(np.random.PCG64(self._rng.integers(2**63)))
+        spread = 1.0 + c.friction_spread * drawn.uniform(-1.0, 1.0, n)
+        signs = drawn.choice([-1.0, 1.0], n)
+        coulomb = c.each("coulomb_nm", n)
+        static = coulomb if c.static_nm is None else c.each("static_nm", n)
+        rows = (
+            drive.stiffness,
+            drive.gear_damping,
+            drive.rotor_inertia,
+            drive.loop_damping,
+            spread * coulomb,
+            spread * static,
+            spread * c.each("viscous_nm_s_per_rad", n),
+            c.each("ripple_nm", n),
+            signs * c.each("sensor_bias_nm", n),
+            c.each("sensor_ripple_nm", n),
+            self._damping,
+        )
+        self.gains = np.concatenate([np.zeros(LAW_SIZE), *rows])
+        law = laid_over(Law, self.gains)
+        law.substeps = max(1, math.ceil(h / LOOP_S - 1e-9))
+        period = h / law.substeps
+        law.h, law.ratio = h, c.inertia_shaping
+        law.delay = min(MOST_DELAY - 1, round(c.loop_delay_s / period))
+        law.keep = math.exp(-2.0 * math.pi * c.loop_cutoff_hz * period)
+        law.observes = -math.expm1(-2.0 * math.pi * c.friction_observer_hz * period)
+        law.stribeck, law.waves = c.stribeck_velocity_rad_per_s, float(c.ripple_per_turn)
+        law.at_motor = c.encoder == "motor"
+        law.past_rate = {"clip": CLIP, "stop": STOP, "ignore": IGNORE}[c.past_torque_rate]
+        law.rate = drive.torque_rate * dt_s
+        cutoff = c.command_cutoff_hz
+        law.command_keep = 0.0 if cutoff is None else math.exp(-2.0 * math.pi * cutoff * dt_s)
+        self.memory = np.zeros(ACCOUNT_SIZE + (_ROWS + 2 * MOST_DELAY) * n + scene.model.nv**2)
+
+    def start(self, scene: Scene, data: mujoco.MjData, rng: np.random.Generator, dt_s: float) -> None:
+        """The arm is at rest, held by its drives."""
+        n, law = self._n, laid_over(Law, self.gains)
+        for name in ("passive", "smooth", "actuator", "constraint"):
+            law[name] = getattr(data, f"qfrc_{name}").ctypes.data
+        posed = mujoco.MjData(scene.model)
+        posed.qpos[:] = data.qpos
+        mujoco.mj_forward(scene.model, posed)
+        held = (posed.qfrc_bias - posed.qfrc_passive)[scene.dof_ids]
+        self.memory[:] = 0.0
+        rows = self.memory[ACCOUNT_SIZE : ACCOUNT_SIZE + _ROWS * n].reshape(_ROWS, n)
+        drive = self._c.values(n)
+        rows[THETA] = data.qpos[scene.qpos_ids] + held / drive.stiffness
+        rows[MOTOR] = rows[COMMAND] = held
+        ring = self.memory[ACCOUNT_SIZE + _ROWS * n :][: 2 * MOST_DELAY * n].reshape(MOST_DELAY, 2, n)
+        ring[:, 0] = held
+        laid_over(Account, self.memory).stored_at_start = 0.5 * float(np.sum(held * held / drive.stiffness))
