@@ -26,7 +26,8 @@ def rms(values: NDArray[np.float64]) -> float:
 
 def tip_control_error_m(trace: Trace) -> NDArray[np.float64]:
     """|p_believed - p_WTd| at every tick (rows,) [m]; NaN where the controller was not asked."""
-    return np.linalg.norm(trace.block("tip_believed") - trace.block("tip_ref"), axis=1)
+    errors: NDArray[np.float64] = np.linalg.norm(trace.block("tip_believed") - trace.block("tip_ref"), axis=1)
+    return errors
 
 
 def of_asked(reduce: Callable[[NDArray[np.float64]], float], errors: NDArray[np.float64]) -> float:
