@@ -14,7 +14,7 @@ import pyarrow.parquet
 from surgsim.compare.job import OUTCOMES
 from surgsim.compare.unfinished import unfinished
 from surgsim.errors import SurgsimError, unknown_name
-from surgsim.metrics.catalog import METRICS, SHIPPED
+from surgsim.metrics.catalog import METRICS
 from surgsim.metrics.timing import TIMING_METRICS
 from surgsim.recording.files import replacing, write_file
 from surgsim.recording.sealed import read_sealed
@@ -120,7 +120,7 @@ def _write(path: Path, table: pa.Table, write: Callable[[pa.Table, Any], None]) 
 
 
 def read_table(root: Path) -> pa.Table:
-    """The table of a results folder.
+    """The table of a results folder; null in metrics that there were not yet when the batch was run.
 
     Raises:
         SurgsimError: If there is none, the batch is not finished, or the table is not one of surgsim's.
@@ -136,7 +136,7 @@ def read_table(root: Path) -> pa.Table:
     except (OSError, ValueError, pa.ArrowException) as error:
         reason = next(iter(str(error).splitlines()), "it cannot be read")
         raise SurgsimError(f"{path} is damaged: {one_line(reason, 200)}") from error
-    later = [name for name in METRICS if name not in SHIPPED and name not in table.column_names]
+    later = [name for name in METRICS if name not in table.column_names]
     missing = [name for name in schema().names if name not in (*table.column_names, *later)]
     if missing:
         raise SurgsimError(f"{path} has no column '{missing[0]}': it is not a table of this version")
@@ -149,7 +149,7 @@ def read_table(root: Path) -> pa.Table:
         raise SurgsimError(f"{path} has no rows")
     if (table.schema.metadata or {}).get(_SEAL) != _digest(table):
         raise SurgsimError(f"{path} is damaged: it does not hold what `surgsim compare` wrote")
-    for name in later:  # of a package that was installed after the batch
+    for name in later:
         table = table.append_column(pa.field(name, pa.float64()), pa.nulls(table.num_rows, pa.float64()))
     return table.replace_schema_metadata(None)
 

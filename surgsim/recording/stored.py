@@ -11,7 +11,8 @@ _RELATIVE_TOLERANCE = 1e-9  # other versions of NumPy may sum in another order
 def differences(stored: Mapping[str, float | None], recomputed: Mapping[str, float | None]) -> list[str]:
     """Say in words where the two differ; nothing when they agree.
 
-    A metric of another package that is installed on one side alone is no difference.
+    A metric of another package that is installed on one side alone is no difference, nor is one that came
+    after the run and that its trace does not define.
 
     Args:
         stored: Metrics read from a file; None where one does not apply.
@@ -19,7 +20,7 @@ def differences(stored: Mapping[str, float | None], recomputed: Mapping[str, flo
     """
     found = []
     for name in sorted(recomputed):
-        if name not in stored and name not in SHIPPED:
+        if name not in stored and (name not in SHIPPED or recomputed[name] is None):
             continue
         if name not in stored:
             found.append(f"{name}: not stored, the trace gives {_text(recomputed[name])}")

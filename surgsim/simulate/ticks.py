@@ -13,13 +13,13 @@ from numba import types
 from numpy.typing import NDArray
 
 from surgsim.compiled import call_at, compiled
-from surgsim.control.decision import decide, forget, measure
+from surgsim.control.decision import ESTIMATOR, decide, forget, measure
 from surgsim.plant.bore import Bore
 from surgsim.plant.contacts import Watch
 from surgsim.plant.world import Hooks
 from surgsim.simulate.safety import Guard, is_safe
 from surgsim.simulate.stop import Stop, brake
-from surgsim.tick.algebra import dot, times
+from surgsim.tick.algebra import dot, norm, times
 from surgsim.tick.arrays import (
     Control,
     Feedback,
@@ -82,6 +82,8 @@ class RowPlaces(Record):
     q_ref: int
     tip: int
     tip_ref: int
+    tip_believed: int
+    rcm_error_believed: int
     wrist: int
     trocar: int
     resolver_residual: int
@@ -183,6 +185,17 @@ def _record_torque(row: Array, at: RowPlaces, limit: Array, torque: Array) -> No
 
 
 @compiled
+def _record_belief(row: Array, at: RowPlaces, c: Control) -> None:
+    """Where the controller takes tip and shaft to be: its nominal model at the measured joint positions.
+
+    `c.seen` is that also where a resolver is evaluated at the joint reference.
+    """
+    _put(row, at.tip_believed, c.seen.p_WT)
+    if c.seen.has_trocar and c.who != ESTIMATOR:
+        row[at.rcm_error_believed] = norm(c.seen.rcm_error)
+
+
+@compiled
 def _record(run: Run, row: Array, c: Control, limit: Array, took: float) -> None:
     """What the controller decided."""
     p, at = run.progress, run.at
@@ -278,6 +291,7 @@ def run_ticks(
         before = thread_time() if timed else math.nan
         status = decide(c)
         took = thread_time() - before if timed else math.nan
+        _record_belief(row, at, c)
         if status == GOES_ON:
             p.infeasible = 0
             stop.begun = 0

@@ -65,6 +65,8 @@ SHORTER = {
     "surgsim compare breathing_hidden --out runs/breathing_hidden": f"{SHORT} --controllers vprnn",
     "surgsim compare robustness --seeds 0:1 --controllers vprnn,joint_impedance,rcm_inverse_dynamics "
     "--out runs/robustness": "--controllers vprnn",
+    "surgsim compare circle_lwr4plus --controllers rcm_inverse_dynamics,joint_impedance,vprnn --seeds 0:5 "
+    "--set 'disturbances=[{type: calibration_error}]' --out runs/calibration": f"{SHORT} --seeds 0:1",
     "surgsim compare frontier --seeds 0:1 --out runs/frontier": "--controllers joint_impedance",
     "surgsim compare torque_level --out runs/torque_level": "--controllers rcm_inverse_dynamics",
     "surgsim adopt desk_arm.xml --flange tool "

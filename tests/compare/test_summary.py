@@ -4,13 +4,13 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-import pyarrow.parquet as pq
 import pytest
 
 from surgsim.compare.failures import failing
 from surgsim.compare.leaderboard import leaderboard
 from surgsim.compare.observations import Observations
 from surgsim.compare.summary import summary
+from surgsim.compare.table import read_table
 
 TIP = "tip_error_rms_mm"
 RESULTS = Path(__file__).parents[2] / "results" / "leaderboard"
@@ -105,7 +105,7 @@ def test_where_each_fails(runs_of):
 @pytest.mark.parametrize("suite", ["nominal", "theatre"])
 def test_the_first_sentence_of_the_reference_runs_against_plain_arithmetic(suite):
     """The figures of the sentence, from the rows alone."""
-    table = pq.read_table(RESULTS / suite / "runs.parquet")
+    table = read_table(RESULTS / suite)
     rows, metric = table.to_pylist(), "rcm_error_rms_mm"
     assert all(row["outcome"] == "completed" for row in rows)
     scenarios, names = sorted({r["scenario"] for r in rows}), {r["controller"] for r in rows}

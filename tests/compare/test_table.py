@@ -11,7 +11,7 @@ import pyarrow.csv
 import pyarrow.parquet
 import pytest
 
-from surgsim.compare.table import MACHINE_COLUMNS, Row, read_table, schema, write_table
+from surgsim.compare.table import MACHINE_COLUMNS, Row, read_table, schema, sealed_table, write_table
 from surgsim.errors import SurgsimError
 from surgsim.metrics.catalog import METRICS
 from surgsim.recording.sealed import sealed
@@ -214,6 +214,14 @@ def test_a_table_of_something_else(table, tmp_path):
     with pytest.raises(SurgsimError) as error:
         read_table(tmp_path)
     assert str(error.value) == f"{path} has no rows"
+
+
+def test_a_metric_that_came_after_the_batch_is_null(table, tmp_path):
+    before = table.drop_columns(["tip_control_error_rms_mm"])
+    pa.parquet.write_table(sealed_table(before), tmp_path / "runs.parquet")
+    found = read_table(tmp_path)
+    assert found["tip_control_error_rms_mm"].null_count == found.num_rows == table.num_rows
+    assert found.select(before.column_names).equals(before.replace_schema_metadata(None))
 
 
 def test_shards_that_end_at_the_same_time_do_not_disturb_each_other(results, tmp_path, monkeypatch):

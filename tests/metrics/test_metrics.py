@@ -24,6 +24,8 @@ CASES = [
     ("tip_error_max_mm", {"tip_error": [0.003, 0.004, 0.0, 0.0]}, 4.0),
     ("rcm_error_rms_mm", {"rcm_error": [0.006, 0.0, 0.008, 0.0]}, 5.0),
     ("rcm_error_max_mm", {"rcm_error": [0.006, 0.0, 0.008, 0.0]}, 8.0),
+    ("rcm_control_error_rms_mm", {"rcm_error_believed": [0.006, 0.0, 0.008, 0.0]}, 5.0),
+    ("rcm_control_error_max_mm", {"rcm_error_believed": [0.006, NAN, 0.008, 0.0]}, 8.0),
     ("manipulability_mean", {"manipulability": [0.1, 0.2, 0.3, 0.4]}, 0.25),
     ("manipulability_min", {"manipulability": [0.3, 0.2, 0.3, 0.4]}, 0.2),
     ("resolver_residual_rms", {"resolver_residual": [0.3, 0.4, 0.0, 0.0]}, 0.25),

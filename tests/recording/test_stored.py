@@ -21,3 +21,8 @@ def test_every_difference_is_said() -> None:
 
 def test_a_metric_of_a_package_that_is_on_one_side_alone_is_no_difference() -> None:
     assert differences({"a": 1.0, "theirs": 2.0}, {"a": 1.0, "others": 3.0}) == []
+
+
+def test_a_metric_that_came_after_the_run_is_a_difference_where_the_trace_has_it_alone() -> None:
+    assert differences({}, {"sparc": None}) == []
+    assert differences({}, {"sparc": 3.0}) == ["sparc: not stored, the trace gives 3.0"]

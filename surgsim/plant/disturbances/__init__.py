@@ -8,6 +8,7 @@ DISTURBANCES = Catalog(
     {
         "actuation_delay": "surgsim.plant.disturbances.actuation_delay:ActuationDelayConfig",
         "breathing": "surgsim.plant.disturbances.breathing:BreathingConfig",
+        "calibration_error": "surgsim.plant.disturbances.calibration_error:CalibrationErrorConfig",
         "gravity_error": "surgsim.plant.disturbances.gravity_error:GravityErrorConfig",
         "guiding_hand": "surgsim.plant.disturbances.guiding_hand:GuidingHandConfig",
         "inertia_error": "surgsim.plant.disturbances.inertia_error:InertiaErrorConfig",

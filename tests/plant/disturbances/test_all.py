@@ -14,6 +14,7 @@ from surgsim.simulate.setup import prepare
 SPREAD = {
     "actuation_delay": ", jitter_s: 0.003",
     "breathing": ", random_phase: true, spread: 0.5",
+    "calibration_error": "",
     "gravity_error": ", direction: random, spread: 0.5",
     "guiding_hand": "",
     "inertia_error": ", spread: 0.5",
