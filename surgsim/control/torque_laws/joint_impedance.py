@@ -1,13 +1,13 @@
 """Joint impedance: every joint a spring and damper about the resolver's reference."""
 
-from typing import Literal
+from typing import Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from surgsim.catalog import PartConfig
 from surgsim.compiled import compiled
-from surgsim.control.torque_laws.base import KernelTorqueLaw, for_joints
+from surgsim.control.torque_laws.base import KernelTorqueLaw, with_lists
 from surgsim.models.arm import ArmModel
 from surgsim.models.config import PerJoint
 from surgsim.tick.arrays import Seen
@@ -33,16 +33,23 @@ class JointImpedanceConfig(PartConfig):
     stiffness_nm_per_rad: PerJoint | None = None
     damping_nm_s_per_rad: PerJoint | None = None
 
+    def written_out(self, joints: int) -> Self:
+        """The same law with both lists (joints,).
+
+        Raises:
+            SurgsimError: If a list has not a number for each joint.
+        """
+        defaults = {"stiffness_nm_per_rad": STIFFNESS, "damping_nm_s_per_rad": DAMPING}
+        return with_lists(self, defaults, joints)
+
     def build(self, arm: ArmModel) -> KernelTorqueLaw:
         """The law; gains K (n,), D (n,).
 
         Raises:
             SurgsimError: If a list has not a number for each joint.
         """
-        n = arm.limits.q_min.size
-        stiffness = for_joints("stiffness_nm_per_rad", self.stiffness_nm_per_rad, STIFFNESS, n)
-        damping = for_joints("damping_nm_s_per_rad", self.damping_nm_s_per_rad, DAMPING, n)
-        gains = np.concatenate((stiffness, damping))
+        whole = self.written_out(arm.limits.q_min.size)
+        gains = np.array([*(whole.stiffness_nm_per_rad or ()), *(whole.damping_nm_s_per_rad or ())])
         return KernelTorqueLaw(kernel=joint_impedance, arm=arm, terms=("joint", "bias"), gains=gains)
 
 
