@@ -3,7 +3,6 @@
 import math
 from collections.abc import Callable, Sequence
 
-from surgsim.scenario.load import load_scenario
 from surgsim.scenario.schema import Scenario
 from surgsim.tuning.gains import RANGE, Gain, Values
 from surgsim.tuning.trials import Report, Trials
@@ -26,17 +25,16 @@ def measure_margins(tuning: Tuning, trials: Trials, report: Report) -> None:
     best, runs, step_s = tuning.best, 0, whole_step_s(tuning.scenarios)
     most = _most_delay(tuning.scenarios)
 
-    def completes(values: Values, change: Callable[[Scenario], Scenario] = lambda same: same) -> bool:
+    def completes(values: Values, delay_s: float = 0.0) -> bool:
         nonlocal runs
-        found = trials.of(list(cases_of(tuning, best.number, values, change)), report)
+        found = trials.of(list(cases_of(tuning, best.number, values, delay_s)), report)
         runs += len(found)
         return all(trial.completed for trial in found)
 
     delay, factor = None, None
     if all(trial.completed for trial in best.trials):
         if most > 0:
-            level = last_passed(lambda k: completes(best.values, lambda s: with_delay(s, k * step_s)), most)
-            delay = level * step_s
+            delay = step_s * last_passed(lambda k: completes(best.values, k * step_s), most)
         factor = gain_factor(
             last_passed(lambda k: completes(_scaled(tuning.gains, best.values, gain_factor(k))), GAIN_STEPS)
         )
@@ -69,13 +67,6 @@ def _scaled(gains: Sequence[Gain], values: Values, factor: float) -> Values:
 def whole_step_s(scenarios: Sequence[Scenario]) -> float:
     """The shortest time that is a whole number of control periods in every scenario [s]."""
     return math.lcm(*(round(scenario.control_period_s * _NS) for scenario in scenarios)) / _NS
-
-
-def with_delay(scenario: Scenario, delay_s: float) -> Scenario:
-    """`scenario` with torques that come so much later [s]."""
-    tree = scenario.resolved()
-    tree["disturbances"].append({"type": "actuation_delay", "delay_s": delay_s})
-    return load_scenario(tree)
 
 
 def last_passed(passes: Callable[[int], bool], most: int) -> int:

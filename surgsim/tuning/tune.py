@@ -1,7 +1,7 @@
 """The runs that a search asks for, and what it makes of them."""
 
 import tempfile
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 from typing import Any
@@ -52,19 +52,26 @@ def _values(tuning: Tuning, x: Array) -> Values:
     return {gain.key: gain.at(float(place)) for gain, place in zip(tuning.gains, x, strict=True)}
 
 
-def cases_of(
-    tuning: Tuning, number: int, values: Values, change: Callable[[Scenario], Scenario] = lambda same: same
-) -> Iterator[Case]:
-    """The runs of a candidate on every scenario and seed, perhaps with a change of the scenario.
+def cases_of(tuning: Tuning, number: int, values: Values, delay_s: float = 0.0) -> Iterator[Case]:
+    """The runs of a candidate on every scenario and seed, perhaps with torques that come so much later [s].
 
     The controller as it is keeps its name, so that its runs are those that a person has seen.
     """
-    told: dict[str, Any] = {"candidate": number, "gains": dict(values)}
+    told: dict[str, Any] = {"candidate": number, "gains": dict(values), "extra_delay_s": delay_s}
     for base in tuning.scenarios:
         try:
             own = values == tuning.start
-            scenario = change(base if own else load_scenario(base, controller=tuning.tuned(values)))
+            scenario = base if own else load_scenario(base, controller=tuning.tuned(values))
+            if delay_s > 0.0:
+                scenario = with_delay(scenario, delay_s)
         except ScenarioError as error:
             yield Case(scenario=None, name=base.name, seed=base.seed, told=told, refusal=str(error))
         else:
             yield Case(scenario=scenario, name=base.name, seed=base.seed, told=told)
+
+
+def with_delay(scenario: Scenario, delay_s: float) -> Scenario:
+    """`scenario` with torques that come so much later than they do there [s]."""
+    tree = scenario.resolved()
+    tree["disturbances"].append({"type": "actuation_delay", "delay_s": delay_s})
+    return load_scenario(tree)

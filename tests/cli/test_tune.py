@@ -70,6 +70,8 @@ def test_a_short_tuning_leaves_a_controller_that_runs_and_says_where_it_comes_fr
     assert (found["finished"], found["runs"], found["candidates"]) == (True, 6, 3)
     assert [line["candidate"] for line in lines(folder)][:6] == [0, 0, 1, 1, 2, 2]
     assert len(lines(folder)) == len(runner.folders) == 6 + found["margins"]["runs"]
+    assert {line["extra_delay_s"] for line in lines(folder)[:6]} == {0.0}
+    assert max(line["extra_delay_s"] for line in lines(folder)) == pytest.approx(0.05)
     assert {line["seed"] for line in lines(folder)} == {1000, 1001}
     assert not any(Path(run).exists() for run in runner.folders)
 

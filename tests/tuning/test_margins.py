@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from surgsim.simulate.loop import simulate
-from surgsim.tuning.margins import GAIN_STEPS, gain_factor, last_passed, whole_step_s, with_delay
+from surgsim.tuning.margins import GAIN_STEPS, gain_factor, last_passed, whole_step_s
+from surgsim.tuning.tune import with_delay
 
 
 @pytest.mark.parametrize("most", [1, 2, 7, 50, 64])
