@@ -13,7 +13,7 @@ import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Annotated, Any, ClassVar, Literal, Protocol, Union, get_args
+from typing import Annotated, Any, ClassVar, Literal, Protocol, Self, Union, get_args
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, create_model, model_validator
 
@@ -51,6 +51,10 @@ class PartConfig(BaseModel):
         Raises:
             ValueError: With the reason.
         """
+
+    def written_out(self, joints: int) -> Self:
+        """The same part with the lists that null stands for, a number for each of the arm's `joints`."""
+        return self
 
 
 NAME = re.compile(r"[a-z0-9][a-z0-9_]{0,63}")

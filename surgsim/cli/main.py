@@ -23,6 +23,7 @@ COMMANDS = (
     "check",
     "list",
     "compare",
+    "tune",
     "report",
     "inspect",
     "reproduce",
@@ -39,6 +40,8 @@ _EPILOG = """examples:
   surgsim check my.yaml                say what is wrong with it
   surgsim list controllers             what can be named in a scenario
   surgsim compare quick                scenarios, controllers and seeds
+  surgsim tune vprnn --scenario circle_panda --budget 300
+                                       better gains for a controller
   surgsim inspect runs/circle_lwr4plus/vprnn-seed0 --view
 """
 

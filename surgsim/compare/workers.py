@@ -4,7 +4,7 @@ import multiprocessing
 import sys
 import time
 from collections import deque
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from multiprocessing.connection import Connection, wait
@@ -55,20 +55,24 @@ def run_jobs(jobs: Sequence[Job], count: int) -> Iterator[Done]:
     Raises:
         SurgsimError: If the disk refuses a folder, or processes cannot start.
     """
-    pool = _Pool(jobs=jobs, waiting=deque(range(len(jobs))))
+    with kept_workers(count) as run:
+        yield from run(jobs)
+
+
+@contextmanager
+def kept_workers(count: int) -> Iterator[Callable[[Sequence[Job]], Iterator[Done]]]:
+    """What does jobs as `run_jobs`, again and again in the same `count` processes."""
+    pool = _Pool()
     try:
-        for _ in range(min(count, len(jobs))):
-            pool.hire()
-        while pool.busy:
-            yield from pool.collect()
+        yield lambda jobs: pool.run(jobs, count)
     finally:
         pool.dismiss()
 
 
 @dataclass
 class _Pool:
-    jobs: Sequence[Job]
-    waiting: deque[int]
+    jobs: Sequence[Job] = ()
+    waiting: deque[int] = field(default_factory=deque)
     workers: list[_Worker] = field(default_factory=list)
     tries: dict[int, int] = field(default_factory=dict)
     stillborn: int = 0
@@ -76,6 +80,16 @@ class _Pool:
     @property
     def busy(self) -> bool:
         return any(worker.index is not None for worker in self.workers)
+
+    def run(self, jobs: Sequence[Job], count: int) -> Iterator[Done]:
+        """Do `jobs` in at most `count` processes, those that are there first."""
+        self.jobs, self.waiting, self.tries = jobs, deque(range(len(jobs))), {}
+        for worker in self.workers:
+            self.assign(worker)
+        while len(self.workers) < min(count, len(jobs)):
+            self.hire()
+        while self.busy:
+            yield from self.collect()
 
     def hire(self) -> None:
         """Start a process, and give it the next job."""

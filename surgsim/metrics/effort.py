@@ -25,6 +25,19 @@ def torque_ratio_max(trace: Trace) -> float:
     return float(np.nanmax(ratio)) if np.isfinite(ratio).any() else float("nan")
 
 
+def torque_peak_nm(trace: Trace) -> float:
+    """Largest |joint torque| [N m]; NaN on the kinematic plant."""
+    tau = trace.block("tau")
+    return float(np.nanmax(np.abs(tau))) if np.isfinite(tau).any() else float("nan")
+
+
+def torque_total_mean_nm(trace: Trace) -> float:
+    """Mean over time of the Euclidean norm of the joint torques [N m]; NaN on the kinematic plant."""
+    total = np.linalg.norm(trace.block("tau"), axis=1)
+    total = total[np.isfinite(total)]
+    return float(np.mean(total)) if total.size else float("nan")
+
+
 def saturated_fraction(trace: Trace) -> float:
     """Fraction of ticks in which a commanded torque was cut at its limit; NaN on the kinematic plant."""
     saturated = trace["saturated_joints"]
@@ -64,6 +77,22 @@ METRICS = (
         matters_source=CHOICE,
         meaning="largest joint torque over its limit",
         compute=torque_ratio_max,
+    ),
+    Metric(
+        name="torque_peak_nm",
+        heading="joint torque, largest [N m]",
+        matters=0.1,
+        matters_source=CHOICE,
+        meaning="largest joint torque, N m",
+        compute=torque_peak_nm,
+    ),
+    Metric(
+        name="torque_total_mean_nm",
+        heading="norm of the joint torques, mean [N m]",
+        matters=0.1,
+        matters_source=CHOICE,
+        meaning="mean over time of the norm of the joint torques, N m",
+        compute=torque_total_mean_nm,
     ),
     Metric(
         name="saturated_fraction",

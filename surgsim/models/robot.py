@@ -14,7 +14,7 @@ chain of n revolute joints.
 - a text `description`.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import lru_cache
 from itertools import count, takewhile
 from typing import Self
@@ -85,6 +85,11 @@ class JointLimits:
             jerk=_optional(model, "jerk_limit_rad_per_s3", len(joints)),
             torque_rate=_optional(model, "torque_rate_limit_nm_per_s", len(joints)),
         )
+
+    def published(self) -> dict[str, list[float]]:
+        """The limits by name, a plain number for each joint; without those that are not published."""
+        named = {field.name: getattr(self, field.name) for field in fields(self)}
+        return {name: values.tolist() for name, values in named.items() if np.isfinite(values).all()}
 
 
 def robot_description(name: str) -> str:

@@ -349,10 +349,7 @@ class Simulation:
         meta = TraceMeta(
             scenario=self._setup.scenario.resolved(),
             control_period_s=self._period,
-            limits={
-                name: getattr(limits, name).tolist()
-                for name in ("q_min", "q_max", "velocity", "acceleration", "torque")
-            },
+            limits=limits.published(),
             ending=ending,
         )
         return self._rows.finish(int(self._run.progress.rows), meta)

@@ -102,7 +102,8 @@ class TraceMeta:
     Attributes:
         scenario: The resolved scenario.
         control_period_s: Time between rows [s].
-        limits: Joint limits: q_min, q_max, velocity, acceleration, torque, a number for each joint, SI.
+        limits: Joint limits: q_min, q_max, velocity, acceleration, torque, and where they are published jerk
+            and torque_rate; a number for each joint, SI.
         ending: How the run ended.
     """
 

@@ -24,6 +24,8 @@ NEXT = {
     "compare qui": ["quick"],
     "compare quick --controllers vprnn,pi": ["vprnn,pinv"],
     "compare quick --engine ": ["local", "ray"],
+    "tune rcm_i": ["rcm_interaction_force", "rcm_inverse_dynamics"],
+    "tune pinv --scenario theatre_p": ["theatre_panda"],
     "list to": ["torque-laws"],
     "reproduce vp": ["vprnn"],
     "completion ": list(SCRIPTS),

@@ -69,6 +69,9 @@ SHORTER = {
     "--set 'disturbances=[{type: calibration_error}]' --out runs/calibration": f"{SHORT} --seeds 0:1",
     "surgsim compare frontier --seeds 0:1 --out runs/frontier": "--controllers joint_impedance",
     "surgsim compare torque_level --out runs/torque_level": "--controllers rcm_inverse_dynamics",
+    "surgsim tune joint_impedance --scenario theatre_lwr4plus --budget 60 --out tuned": f"{SHORT} --budget 6",
+    "surgsim compare theatre_lwr4plus --controllers joint_impedance,tuned/joint_impedance_tuned.yaml "
+    "--seeds 0:3": f"{SHORT} --seeds 0:1",
     "surgsim adopt desk_arm.xml --flange tool "
     "--set 'limits.velocity_rad_per_s=[2, 2, 2, 2, 3, 3, 3]'": "--quick",
     "surgsim bench": "--duration 3",
@@ -180,7 +183,7 @@ def again(command):
     """What is added to a command that is typed a second time in its folder."""
     if command == TWO:
         return "--out runs/two_wide"
-    return "--resume" if command.startswith("surgsim compare ") else ""
+    return "--resume" if command.startswith(("surgsim compare ", "surgsim tune ")) else ""
 
 
 def too_wide(lines, columns):

@@ -128,6 +128,42 @@ def test_a_batch_that_is_ended_is_gone_on_with(lenient, tmp_path, how):
     assert whole.items() <= whole_runs(tmp_path).items(), "a whole run was done again"
 
 
+TUNE = [
+    *("tune", "joint_impedance", "--scenario", "circle_lwr4plus", "--out", "out", "--jobs", "2"),
+    *(f"--set={setting}" for setting in short_run(0.3)),
+    *("--budget", "60"),
+]
+
+
+@pytest.mark.parametrize("how", ["Ctrl-C", "SIGTERM"])
+def test_a_tuning_that_is_ended_is_gone_on_with(lenient, tmp_path, how):
+    runs, found = tmp_path / "out" / "evaluations.jsonl", tmp_path / "out" / "joint_impedance_tuned.yaml"
+
+    def lines():
+        return runs.read_text(encoding="utf-8").splitlines() if runs.exists() else []
+
+    typed = lenient(*TUNE, cold=how in COLD).wait(until=lambda: len(lines()) > 3)
+    if how == "Ctrl-C":
+        typed.press(b"\x03")
+    else:
+        os.kill(typed.process.pid, signal.SIGTERM)
+    typed.wait()
+    told = "interrupted" if how == "Ctrl-C" else "ended by SIGTERM"
+    said = (
+        f"surgsim: {told}; the best so far is in out/joint_impedance_tuned.yaml; --resume --out out goes on"
+    )
+    assert said in " ".join(typed.lines)
+    assert typed.status == (130 if how == "Ctrl-C" else 143)
+    assert "Traceback" not in typed.text
+    assert "# interrupted" in found.read_text(encoding="utf-8")
+    assert [path for path in tmp_path.rglob("*") if path.name.startswith(".")] == []
+    kept = lines()
+    again = lenient(*TUNE, "--resume").wait()
+    assert again.status == 0, again.text
+    assert lines()[: len(kept)] == kept
+    assert "# interrupted" not in found.read_text(encoding="utf-8")
+
+
 def whole_runs(folder):
     """Folders of the runs that are whole, with the time at which each was written."""
     found = folder.glob("out/runs/*/*/[!.]*/metrics.json")

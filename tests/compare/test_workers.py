@@ -10,7 +10,7 @@ import pytest
 
 from surgsim.compare import workers
 from surgsim.compare.job import CRASHED, WORKER_DIED, Job, do
-from surgsim.compare.workers import run_jobs
+from surgsim.compare.workers import kept_workers, run_jobs
 from surgsim.errors import SurgsimError
 from surgsim.metrics.timing import TIMING_METRICS
 
@@ -64,6 +64,23 @@ def metrics(job):
 
 def detail(job):
     return json.loads((Path(job.folder) / "metrics.json").read_text())["outcome"]
+
+
+def test_kept_workers_do_one_batch_after_another_and_one_that_has_died_between_is_replaced(jobs):
+    with kept_workers(2) as run:
+        first = {done.index: done.outcome for done in run(jobs(2, "first"))}
+        processes = set(multiprocessing.active_children())
+        second = {done.index: done.outcome for done in run(jobs(3, "second"))}
+        assert set(multiprocessing.active_children()) == processes
+        victim = min(processes, key=lambda process: process.pid)
+        os.kill(victim.pid, signal.SIGKILL)
+        victim.join()
+        third = {done.index: done.outcome for done in run(jobs(2, "third"))}
+        assert list(run([])) == []
+    assert (first, second) == ({0: "completed", 1: "completed"}, dict.fromkeys(range(3), "completed"))
+    assert third == first
+    assert [metrics(job) for job in jobs(2, "first")] == [metrics(job) for job in jobs(2, "third")]
+    assert multiprocessing.active_children() == []
 
 
 def test_neither_the_order_nor_the_process_changes_a_run(jobs):

@@ -33,8 +33,17 @@ COMMANDS = {
     "inspect png": ["inspect", "picture.yaml"],
     "inspect garbage": ["inspect", "garbage.rrd"],
     "reproduce": ["reproduce", "vprn"],
+    "tune": ["tune", "vprn", "--scenario", GOOD, "--budget", "9"],
 }
-COLD = ("check pipe", "run too long", "compare resume", "report folder", "inspect garbage", "reproduce")
+COLD = (
+    "check pipe",
+    "run too long",
+    "compare resume",
+    "report folder",
+    "inspect garbage",
+    "reproduce",
+    "tune",
+)
 """One of each command, which a process has to start for first; the others are forks of a warm one."""
 
 

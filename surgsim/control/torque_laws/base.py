@@ -7,7 +7,7 @@ from typing import Any, Protocol, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from surgsim.catalog import Surroundings
+from surgsim.catalog import PartConfig, Surroundings
 from surgsim.control.failure import ControlFailure, failure_of
 from surgsim.control.inside import Inside
 from surgsim.control.joining import Desk, furnish
@@ -26,6 +26,7 @@ from surgsim.tick.status import GOES_ON
 
 Array = NDArray[np.float64]
 Memory = TypeVar("Memory")
+Config = TypeVar("Config", bound=PartConfig)
 TorqueKernel = Callable[[Array, Seen, Array, Array], int]
 
 
@@ -180,6 +181,19 @@ def for_joints(key: str, given: Sequence[float] | None, profile: Sequence[float]
     if len(given) != n:
         raise SurgsimError(f"{key} has {len(given)} items for an arm of {n} joints: give {n}, or null")
     return np.array(given, dtype=np.float64)
+
+
+def with_lists(config: Config, profiles: Mapping[str, Sequence[float]], n: int) -> Config:
+    """`config` with n gains under each key of `profiles`, as `for_joints` gives them.
+
+    Raises:
+        SurgsimError: If it has a list of another length.
+    """
+    lists = {
+        key: tuple(for_joints(key, getattr(config, key), profile, n).tolist())
+        for key, profile in profiles.items()
+    }
+    return config.model_copy(update=lists)
 
 
 def seen_of_torque(p: TorqueProblem, arm: ArmModel) -> Seen:

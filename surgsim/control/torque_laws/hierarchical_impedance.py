@@ -1,6 +1,6 @@
 """Hierarchical impedance: tip, then RCM, then joint compliance, each in the null space of those above."""
 
-from typing import Literal
+from typing import Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,7 +8,7 @@ from pydantic import NonNegativeFloat
 
 from surgsim.catalog import PartConfig
 from surgsim.compiled import compiled
-from surgsim.control.torque_laws.base import KernelTorqueLaw, for_joints
+from surgsim.control.torque_laws.base import KernelTorqueLaw, with_lists
 from surgsim.models.arm import ArmModel
 from surgsim.models.config import PerJoint, Vec3
 from surgsim.tick.algebra import (
@@ -52,20 +52,32 @@ class HierarchicalImpedanceConfig(PartConfig):
     joint_stiffness_nm_per_rad: PerJoint | None = None
     joint_damping_nm_s_per_rad: PerJoint | None = None
 
+    def written_out(self, joints: int) -> Self:
+        """The same law with both lists of the joints (joints,).
+
+        Raises:
+            SurgsimError: If a list has not a number for each joint.
+        """
+        defaults = {
+            "joint_stiffness_nm_per_rad": TABLE_I_STIFFNESS,
+            "joint_damping_nm_s_per_rad": TABLE_I_DAMPING,
+        }
+        return with_lists(self, defaults, joints)
+
     def build(self, arm: ArmModel) -> KernelTorqueLaw:
         """The law; gains K_X (3,), D_X (3,), K_N, D_N, K_N2 (n,), D_N2 (n,).
 
         Raises:
             SurgsimError: If a list has not a number for each joint.
         """
-        n = arm.limits.q_min.size
+        whole = self.written_out(arm.limits.q_min.size)
         gains = [
             *self.tip_stiffness_n_per_m,
             *self.tip_damping_n_s_per_m,
             self.rcm_stiffness_n_per_m,
             self.rcm_damping_n_s_per_m,
-            *for_joints("joint_stiffness_nm_per_rad", self.joint_stiffness_nm_per_rad, TABLE_I_STIFFNESS, n),
-            *for_joints("joint_damping_nm_s_per_rad", self.joint_damping_nm_s_per_rad, TABLE_I_DAMPING, n),
+            *(whole.joint_stiffness_nm_per_rad or ()),
+            *(whole.joint_damping_nm_s_per_rad or ()),
         ]
         terms = ("tip", "rcm", "joint", "bias")
         return KernelTorqueLaw(kernel=hierarchical_impedance, arm=arm, terms=terms, gains=np.array(gains))

@@ -1,0 +1,1 @@
+"""Tuning: gains that make a controller accurate, found by runs, and how far they are from failing."""
