@@ -345,11 +345,14 @@ class Simulation:
     def trace(self) -> Trace:
         """The trace so far, with its derived columns."""
         ending = self._ending or Ending(outcome=Outcome.COMPLETED, t_s=self.time_s)
-        limits = self._setup.scene.limits
+        drive = self._setup.arm.drive
+        limits = self._setup.scene.limits.published()
+        if drive is not None and math.isfinite(drive.torque_rate):
+            limits["torque_rate"] = [drive.torque_rate] * len(limits["torque"])
         meta = TraceMeta(
             scenario=self._setup.scenario.resolved(),
             control_period_s=self._period,
-            limits=limits.published(),
+            limits=limits,
             ending=ending,
         )
         return self._rows.finish(int(self._run.progress.rows), meta)

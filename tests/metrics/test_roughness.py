@@ -44,9 +44,11 @@ def test_torque_rates_are_to_the_limit_of_each_joint(trace_of):
     assert _value(trace, "torque_rate_median_nm_per_s") == pytest.approx(55.0)
 
 
-def test_a_torque_exactly_at_its_rate_is_not_over_it(trace_of):
+def test_a_torque_that_is_held_at_its_rate_counts(trace_of):
     trace = _limited(trace_of(3, period_s=0.5, tau=_joints(3, j1=[0.0, 1.0, 2.5])), torque_rate=[2.0] * 7)
-    assert _value(trace, "torque_rate_over_fraction") == pytest.approx(0.5)
+    assert _value(trace, "torque_rate_over_fraction") == pytest.approx(1.0)
+    slower = _limited(trace_of(3, period_s=0.5, tau=_joints(3, j1=[0.0, 0.9, 2.4])), torque_rate=[2.0] * 7)
+    assert _value(slower, "torque_rate_over_fraction") == pytest.approx(0.5)
 
 
 def test_jerk_is_the_second_difference_of_the_velocity(trace_of):
@@ -97,7 +99,7 @@ def test_a_run_of_an_arm_with_published_limits():
         limits = (7500, 3750, 5000, 6250, 7500, 10000, 10000)  # the data sheet's, rad/s^3
         jerk = max(jerk, *(abs(a) / dt / most for a, most in zip(acceleration, limits, strict=True)))
     assert _value(trace, "torque_rate_ratio_max") == pytest.approx(max(fastest) / 1000.0)
-    assert _value(trace, "torque_rate_over_fraction") == sum(f > 1000.0 for f in fastest) / len(fastest)
+    assert _value(trace, "torque_rate_over_fraction") == sum(f >= 1000.0 for f in fastest) / len(fastest)
     assert _value(trace, "torque_rate_median_nm_per_s") == pytest.approx(statistics.median(fastest))
     assert _value(trace, "jerk_ratio_max") == pytest.approx(jerk)
     assert _value(trace, "torque_peak_nm") == max(abs(x) for row in tau for x in row)
