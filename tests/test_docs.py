@@ -28,6 +28,7 @@ from surgsim.models.config import (
     TrocarConfig,
     WallConfig,
 )
+from surgsim.models.drive import DriveConfig
 from surgsim.plant import PLANTS
 from surgsim.plant.disturbances import DISTURBANCES
 from surgsim.plant.props import PROPS
@@ -142,6 +143,7 @@ def sections():
     found = {
         "scenario": Scenario,
         "robot": RobotConfig,
+        "robot: drive": DriveConfig,
         "robot: flange": FlangeConfig,
         "robot: limits": LimitsConfig,
         "robot: capsule": CapsuleConfig,

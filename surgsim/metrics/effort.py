@@ -45,6 +45,11 @@ def saturated_fraction(trace: Trace) -> float:
     return float(np.mean(saturated > 0)) if saturated.size else float("nan")
 
 
+def motor_loss_j(trace: Trace) -> float:
+    """Energy lost in the motors' friction and in the gears [J]; NaN on ideal drives."""
+    return float(trace["drive_loss_j"][-1]) if "drive_loss" in trace else float("nan")
+
+
 def resolver_residual_rms(trace: Trace) -> float:
     """RMS norm of the task and RCM rows that the resolver left unmet [m/s]."""
     residual = trace["resolver_residual_m_per_s"]
@@ -101,6 +106,14 @@ METRICS = (
         matters_source=CHOICE,
         meaning="fraction of ticks with a torque cut at its limit",
         compute=saturated_fraction,
+    ),
+    Metric(
+        name="motor_loss_j",
+        heading="energy lost in motors and gears [J]",
+        matters=0.1,
+        matters_source=CHOICE,
+        meaning="energy lost in the friction of the motors and in the gears, J",
+        compute=motor_loss_j,
     ),
     Metric(
         name="resolver_residual_rms",
