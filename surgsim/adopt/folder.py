@@ -13,6 +13,7 @@ from surgsim.models.adopted.arm import adopted
 from surgsim.models.adopted.card import Card
 from surgsim.models.adopted.written import model_files
 from surgsim.models.config import RobotConfig
+from surgsim.models.drive import FILE as DRIVE
 from surgsim.recording.files import write_file
 from surgsim.recording.folders import make_folder, sync_tree
 from surgsim.runs.drafts import draft_of
@@ -96,6 +97,8 @@ def adopt(
 def write_robot_folder(folder: Path, adoption: Adoption) -> None:
     """Write the arm's folder in one step; one that is there is replaced if it was written so, and not edited.
 
+    A `drive.yaml` that was put there is kept.
+
     Raises:
         SurgsimError: If the folder holds something else, or the disk refuses.
     """
@@ -108,6 +111,8 @@ def write_robot_folder(folder: Path, adoption: Adoption) -> None:
     if adoption.ports is not None:
         files[MAP] = port_picture(adoption.ports, name)
     try:
+        if (folder / DRIVE).is_file():  # somebody's own knowledge of the arm
+            files[DRIVE] = (folder / DRIVE).read_bytes()
         make_folder(folder.parent)
         with draft_of(folder) as draft:
             for place, content in files.items():

@@ -188,3 +188,21 @@ def test_a_package_offers_a_robot(tmp_path, named, monkeypatch):
 def test_a_urdf_needs_no_options_where_it_says_its_flange(tmp_path, named, capsys):
     assert main(["adopt", str(write_urdf(tmp_path)), "--out", str(named), "--quick"]) == 0
     assert "6: joint_1" in capsys.readouterr().out
+
+
+def test_a_robot_s_folder_can_state_its_drives_and_keeps_them(tmp_path, named, capsys):
+    _adopted(tmp_path, named, "--name", "their_arm")
+    with pytest.raises(ValueError, match=r"give stiffness_nm_per_rad: the robot's folder has no drive\.yaml"):
+        RobotConfig(name="their_arm", drive="real")
+    text = "stiffness_nm_per_rad: 8000.0\nrotor_inertia_kg_m2: [0.6, 0.6, 0.5, 0.5, 0.2, 0.2, 0.2]\n"
+    (named / "their_arm" / "drive.yaml").write_text(text + "coulomb_nm: 1.0\n")
+    drives = RobotConfig(name="their_arm", drive={"coulomb_nm": 0.5}).drives
+    assert drives.stiffness_nm_per_rad == 8000.0
+    assert drives.coulomb_nm == 0.5
+    words = ["adopt", str(tmp_path / "arm.xml"), "--set", "base_body=pedestal", "--set", JOINTS, "--quick"]
+    assert main([*words, "--out", str(named), "--name", "their_arm"]) == 0
+    assert RobotConfig(name="their_arm", drive="real").drives.coulomb_nm == 1.0
+    (named / "their_arm" / "drive.yaml").write_text("stiffness: 1.0\n")
+    with pytest.raises(ValueError, match=r"drive\.yaml: .*stiffness"):
+        RobotConfig(name="their_arm", drive="real")
+    capsys.readouterr()
