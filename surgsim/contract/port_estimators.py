@@ -32,7 +32,7 @@ def starts_as_seen(config: Any, scene: SceneConfig) -> None:
     p = velocity_problem(arm, 0, trocar_speed=0.0)
     kin, dyn = arm.evaluate(p.q, p.v)
     problem = PortProblem(
-        t_s=0.0, dt_s=DT, v=p.v, tau_measured=dyn.bias, kin=kin, dyn=dyn, p_WC=p.p_WC, v_WC=p.v_WC
+        t_s=0.0, dt_s=DT, q=p.q, v=p.v, tau_measured=dyn.bias, kin=kin, dyn=dyn, p_WC=p.p_WC, v_WC=p.v_WC
     )
     estimator = config().build(arm)
     first = _estimates(estimator, problem)

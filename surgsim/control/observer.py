@@ -6,6 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surgsim.compiled import compiled
+from surgsim.tick.algebra import back_substitute, factor
+from surgsim.tick.scratch import scratch, scratch_matrix
 
 Array = NDArray[np.float64]
 OFFSET_MEMORY_S = 0.05
@@ -69,6 +71,73 @@ def observe(
         inertia[i, i] += dt * damping[i]
         rest[i] = bias[i] + damping[i] * v[i] - d[i]
         last[i] = v[i]
+    return d
+
+
+def position_observer_size(n: int) -> int:
+    """Length of the memory of `observe_positions`: q, v, d and rest (n,) each, inertia (n, n)."""
+    return n * (n + 4)
+
+
+@compiled
+def observe_positions(
+    memory: Array,
+    first: bool,
+    M: Array,
+    bias: Array,
+    damping: Array,
+    q: Array,
+    tau: Array,
+    gains: tuple[float, float, float],
+    dt: float,
+) -> Array:
+    """The same disturbance torque d from positions alone: no velocity is measured or differentiated.
+
+        v+ = v + T M^-1 (tau + d - bias - D v),  q+ = q + T (v + v+)/2
+        q += a e,  v += b e/T,  d += g M e/T^2,  e = q_m - q
+
+    with the gains a, b, g of `surgsim.control.filters.filter_gains`.
+
+    Args:
+        memory: Of `position_observer_size`, changed in place.
+        first: Whether nothing is known yet: the arm is at rest, and d is what its torques bear too much.
+        M: Nominal inertia (n, n).
+        bias: Nominal Coriolis, centrifugal and gravity torque (n,) [N m].
+        damping: D (n,) [N m s/rad].
+        q: Measured joint positions (n,) [rad].
+        tau: Torque that acted over the last period (n,) [N m].
+        gains: a, b, g.
+        dt: Control period T [s].
+    """
+    n = q.size
+    known, speed, d, rest = memory[:n], memory[n : 2 * n], memory[2 * n : 3 * n], memory[3 * n : 4 * n]
+    inertia = memory[4 * n : 4 * n + n * n].reshape((n, n))
+    if first:
+        for i in range(n):
+            known[i], speed[i], d[i] = q[i], 0.0, bias[i] - tau[i]
+    else:
+        L, rate, e = scratch_matrix(n, n), scratch(n), scratch(n)
+        L[:] = inertia
+        if factor(L):
+            for i in range(n):
+                rate[i] = tau[i] - rest[i] - damping[i] * speed[i] + d[i]
+            back_substitute(L, rate)
+            for i in range(n):
+                known[i] += dt * (speed[i] + 0.5 * dt * rate[i])
+                speed[i] += dt * rate[i]
+        for i in range(n):
+            e[i] = q[i] - known[i]
+        for i in range(n):
+            known[i] += gains[0] * e[i]
+            speed[i] += gains[1] * e[i] / dt
+            total = 0.0
+            for j in range(n):
+                total += inertia[i, j] * e[j]
+            d[i] += gains[2] * total / (dt * dt)
+    for i in range(n):
+        rest[i] = bias[i]
+        for j in range(n):
+            inertia[i, j] = M[i, j]
     return d
 
 

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 import surgsim
-from surgsim.control.elastic_observer import LINK, MOTOR, ROWS, W, factor_step, filter_gains, step
+from surgsim.control.elastic_observer import LINK, MOTOR, ROWS, W, factor_step, step
+from surgsim.control.filters import filter_gains
 from surgsim.simulate.loop import Simulation
 from surgsim.simulate.setup import prepare
 

@@ -27,6 +27,7 @@ class PortProblem:
     Attributes:
         t_s: Time since the start [s].
         dt_s: Control period [s].
+        q: Measured joint positions (n,) [rad].
         v: Measured joint velocities (n,) [rad/s].
         tau_measured: Joint torques that acted over the last period (n,) [N m].
         kin: Nominal kinematics at the measured positions.
@@ -37,6 +38,7 @@ class PortProblem:
 
     t_s: float
     dt_s: float
+    q: Array
     v: Array
     tau_measured: Array
     kin: Kinematics
@@ -135,7 +137,7 @@ class KernelPortEstimator:
 
     def _seen(self, p: PortProblem) -> Seen:
         seen = new_seen(self.arm, dt_s=p.dt_s, has_trocar=False)
-        seen.t_s, seen.v[:], seen.tau[:] = p.t_s, p.v, p.tau_measured
+        seen.t_s, seen.q[:], seen.v[:], seen.tau[:] = p.t_s, p.q, p.v, p.tau_measured
         fill_kinematics(seen, p.kin)
         if p.dyn is not None:
             seen.M[:], seen.bias[:] = p.dyn.mass_matrix, p.dyn.bias
@@ -148,6 +150,7 @@ def port_problem_of(seen: Fields, *, has_dynamics: bool) -> PortProblem:
     return PortProblem(
         t_s=seen["t_s"].item(),
         dt_s=seen["dt_s"].item(),
+        q=seen["q"].copy(),
         v=seen["v"].copy(),
         tau_measured=seen["tau"].copy(),
         kin=kinematics_of(seen),

@@ -9,7 +9,8 @@ from pydantic import Field, NonNegativeFloat, PositiveFloat
 
 from surgsim.catalog import PartConfig, Surroundings
 from surgsim.compiled import compiled
-from surgsim.control.observer import observe, observer_size
+from surgsim.control.filters import filter_gains
+from surgsim.control.observer import observe_positions, position_observer_size
 from surgsim.control.port_estimators.base import KernelPortEstimator
 from surgsim.control.rcm import fill_rcm
 from surgsim.models.arm import ArmModel
@@ -21,7 +22,7 @@ from surgsim.tick.status import GOES_ON, RANK_LOST
 Array = NDArray[np.float64]
 _ADVANCE = 0.25 * math.pi
 
-COMPLIANCE, OBSERVER, TARE_S, THRESHOLD, OMEGA, HARMONICS, LEARNING, MOST = range(8)
+COMPLIANCE, OBSERVER, TARE_S, THRESHOLD, OMEGA, HARMONICS, LEARNING, MOST, STATE = range(9)
 """Places of the gains; OMEGA in rad/s, the others as in the config."""
 
 
@@ -30,7 +31,8 @@ class InteractionForceConfig(PartConfig):
 
     Attributes:
         compliance_m_per_n_s: Gain: speed of the estimate per newton [m/(N s)].
-        observer_gain: Share of a period's unexplained velocity change that the force estimate takes in.
+        observer_hz: Cut-off of the force estimate [Hz].
+        state_hz: Cut-off of the positions and velocities that it is made of [Hz].
         tare_s: The mean force over this first time is what payload and friction do, and is taken off; so
             long the shaft must hang free in the port, as a wall that presses on it is taken off too [s].
         threshold_n: Forces below this are taken for noise [N].
@@ -42,7 +44,8 @@ class InteractionForceConfig(PartConfig):
 
     type: Literal["interaction_force"] = "interaction_force"
     compliance_m_per_n_s: PositiveFloat = 0.02
-    observer_gain: Annotated[float, Field(gt=0.0, le=1.0)] = 0.1
+    observer_hz: PositiveFloat = 5.0
+    state_hz: PositiveFloat = 20.0
     tare_s: NonNegativeFloat = 0.2
     threshold_n: NonNegativeFloat = 0.0
     rate_hz: PositiveFloat | None = None
@@ -60,19 +63,20 @@ class InteractionForceConfig(PartConfig):
         count = self.harmonics if self.rate_hz else 0
         gains = [
             self.compliance_m_per_n_s,
-            self.observer_gain,
+            self.observer_hz,
             self.tare_s,
             self.threshold_n,
             2.0 * math.pi * (self.rate_hz or 0.0),
             count,
             self.harmonic_gain_m_per_n_s,
             self.most_m,
+            self.state_hz,
         ]
         return KernelPortEstimator(
             kernel=interaction_force,
             arm=arm,
             gains=np.array(gains, dtype=np.float64),
-            memory_size=7 + 6 * count + observer_size(arm.limits.torque.size),
+            memory_size=7 + 6 * count + position_observer_size(arm.limits.torque.size),
         )
 
 
@@ -84,8 +88,9 @@ def interaction_force(gains: Array, seen: Seen, memory: Array, out: Array) -> in
         o' = G F,    a_k' = G_h F cos(k w t + pi/4),    b_k' = G_h F sin(k w t + pi/4)
         p_C = p_seen + o + sum_k a_k cos(k w t) + b_k sin(k w t)
 
-    d is the disturbance torque of a momentum observer, f its lateral force at the port in the dynamically
-    consistent sense, F the same in the world, with what payload and friction do at the start taken off. With
+    d is the disturbance torque that `observe_positions` infers, f its lateral force at the port in the
+    dynamically consistent sense, F the same in the world, with what payload and friction do at the start
+    taken off. With
     a wall of stiffness K and a shaft that follows the estimate, o' = -G K (o - true offset): a first-order
     lag of 1 / (G K), whatever K is. The harmonics are an internal model: they leave no force at their
     frequencies. What o leaves of a wave leads it by 0 degrees (soft wall) to 90 (stiff wall); the advance of
@@ -97,15 +102,15 @@ def interaction_force(gains: Array, seen: Seen, memory: Array, out: Array) -> in
     t, dt, count = seen.t_s, seen.dt_s, int(gains[HARMONICS])
     tare, offset = memory[:3], memory[3:6]
     waves = memory[7 : 7 + 6 * count].reshape((2 * count, 3))
-    d = observe(
+    d = observe_positions(
         memory[7 + 6 * count :],
         seen.first != 0,
         seen.M,
         seen.bias,
         seen.damping,
-        seen.v,
+        seen.q,
         seen.tau,
-        gains[OBSERVER],
+        filter_gains(gains[STATE], gains[OBSERVER], dt),
         dt,
     )
     force, push = scratch(3), scratch(3)

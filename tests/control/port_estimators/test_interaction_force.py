@@ -21,6 +21,7 @@ def problem(arm, velocity_problem):
     return PortProblem(
         t_s=0.0,
         dt_s=DT,
+        q=p.q,
         v=np.zeros(7),
         tau_measured=dyn.bias.copy(),
         kin=kin,
@@ -49,7 +50,9 @@ def _run(arm, problem, force_of, seconds, constant=None, **config):
 def test_the_estimate_goes_to_where_the_wall_is_as_a_first_order_lag(arm, problem):
     """O' = -G K (o - c): the shaft is taken to follow the estimate at once."""
     place = np.array([0.003, -0.001])
-    out, _ = _run(arm, problem, lambda t, o: K * (place - o), 0.5, tare_s=0.0, observer_gain=1.0)
+    out, _ = _run(
+        arm, problem, lambda t, o: K * (place - o), 0.5, tare_s=0.0, observer_hz=150.0, state_hz=150.0
+    )
     t = np.arange(len(out)) * DT
     expected = place * (1.0 - np.exp(-0.02 * K * t))[:, None]
     np.testing.assert_allclose(out, expected, atol=1e-4)
@@ -59,9 +62,9 @@ def test_the_estimate_goes_to_where_the_wall_is_as_a_first_order_lag(arm, proble
 def test_what_acts_from_the_start_is_taken_off(arm, problem):
     payload = 0.2 * 9.81 * problem.kin.Jv_WT[2]
     push = lambda t, o: K * (np.array([0.002, 0.0]) - o) if t > 0.3 else np.zeros(2)  # noqa: E731
-    with_it, _ = _run(arm, problem, push, 1.0, constant=payload, tare_s=0.2, observer_gain=0.3)
+    with_it, _ = _run(arm, problem, push, 1.0, constant=payload, tare_s=0.2, observer_hz=40.0, state_hz=60.0)
     np.testing.assert_allclose(with_it[-1], [0.002, 0.0], atol=2e-5)
-    without, _ = _run(arm, problem, push, 1.0, constant=payload, tare_s=0.0, observer_gain=0.3)
+    without, _ = _run(arm, problem, push, 1.0, constant=payload, tare_s=0.0, observer_hz=40.0, state_hz=60.0)
     assert np.abs(without[-1] - [0.002, 0.0]).max() > 2e-4
 
 
@@ -75,7 +78,7 @@ def test_harmonics_leave_no_force_at_the_breathing_rate(arm, problem, stiffness)
 
     errors = []
     for rate in (None, 1.0):
-        out, _ = _run(arm, problem, breath, 8.0, tare_s=0.0, rate_hz=rate, observer_gain=1.0)
+        out, _ = _run(arm, problem, breath, 8.0, tare_s=0.0, rate_hz=rate, observer_hz=150.0, state_hz=150.0)
         t = np.arange(len(out)) * DT
         errors.append(np.abs(out[t > 7.0, 0] - wave(t[t > 7.0])).max())
     assert errors[1] < 0.1 * errors[0]

@@ -20,6 +20,7 @@ def follow(arm):
             problem = PortProblem(
                 t_s=k * dt,
                 dt_s=dt,
+                q=np.zeros(7),
                 v=np.zeros(7),
                 tau_measured=np.zeros(7),
                 kin=kin,
