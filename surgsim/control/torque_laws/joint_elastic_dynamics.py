@@ -35,7 +35,7 @@ class JointElasticDynamicsConfig(ElasticObserverConfig):
     """
 
     type: Literal["joint_elastic_dynamics"] = "joint_elastic_dynamics"
-    bandwidth_share: PositiveFloat = 0.44
+    bandwidth_share: PositiveFloat = 0.4
     most_bandwidth_rad_per_s: PositiveFloat = 85.0
     damping_ratio: PositiveFloat = 0.7
 

@@ -32,7 +32,7 @@ class RcmElasticDynamicsConfig(ElasticObserverConfig):
     """
 
     type: Literal["rcm_elastic_dynamics"] = "rcm_elastic_dynamics"
-    bandwidth_share: PositiveFloat = 0.44
+    bandwidth_share: PositiveFloat = 0.4
     most_bandwidth_rad_per_s: PositiveFloat = 85.0
     tip_bandwidth_ratio: PositiveFloat = 1.0
     joint_bandwidth_rad_per_s: NonNegativeFloat = 10.0
