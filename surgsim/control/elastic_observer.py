@@ -54,9 +54,9 @@ Array = NDArray[np.float64]
 Q, V, S, W, LINK, MOTOR, REST, DRY, FRICTION = range(9)
 """Rows of the memory (n,): the state, d, f_r, -c, F, F y; after them M (n, n), then the commands sent."""
 ROWS = 9
-LINK_STATE, LINK_CUTOFF, MOTOR_STATE, MOTOR_CUTOFF, BAND, LEARNING, DELAY, RATE = range(8)
+LINK_STATE, LINK_CUTOFF, MOTOR_STATE, MOTOR_CUTOFF, BAND, LEARNING, DELAY, RATE, AT_MOTOR = range(9)
 """Places of the numbers; after them the rows of the drives."""
-DRIVES = 8
+DRIVES = 9
 STIFFNESS, APPARENT, LOOP, DAMPING, ARMATURE = range(5)
 """Rows of the drives (5, n): K, B_s, D_s, D_l, and B_s as it is part of the nominal inertia."""
 
@@ -99,6 +99,7 @@ class ElasticObserverConfig(PartConfig):
             self.friction_learning_per_s,
             float(self.delay_ticks),
             drive.torque_rate,
+            float(drive.at_motor),
         )
         part_of_inertia = np.zeros(n) if arm.drive is None else drive.apparent_inertia
         inertia = self.inertia_factor * drive.apparent_inertia
@@ -121,6 +122,7 @@ def _as_good_as_rigid(n: int) -> Drive:
         apparent_inertia=inertia,
         loop_damping=np.sqrt(stiffness * inertia),
         torque_rate=math.inf,
+        at_motor=False,
     )
 
 
@@ -131,15 +133,18 @@ def look_ahead(numbers: Array, seen: Seen, memory: Array, d: Array) -> int:
     rows, M = memory[: ROWS * n].reshape((ROWS, n)), memory[ROWS * n : (ROWS + n) * n].reshape((n, n))
     sent, drives = memory[(ROWS + n) * n :].reshape((delay + 1, n)), numbers[DRIVES:].reshape((5, n))
     x, rest, f, L = scratch_matrix(4, n), scratch(n), scratch(n), scratch_matrix(n, n)
+    q = scratch(n)
+    for i in range(n):  # where encoders sit on the motors, the links are a gear's deflection behind
+        q[i] = seen.q[i] - numbers[AT_MOTOR] * seen.tau[i] / drives[STIFFNESS, i]
     if seen.first:
-        _begin(drives, seen, rows, M, sent)
+        _begin(drives, seen, q, rows, M, sent)
     if not factor_step(drives, M, dt, L):
         return RANK_LOST
     for i in range(n):
         rest[i], f[i] = rows[REST, i] + rows[LINK, i], rows[MOTOR, i] + rows[FRICTION, i]
     if not seen.first:
         step(drives, M, L, rest, f, sent[delay], dt, rows)
-        _correct(numbers, drives, M, seen, rows)
+        _correct(numbers, drives, M, seen, q, rows)
     for i in range(n):
         y = min(max(seen.qdot_ref[i] / numbers[BAND], -1.0), 1.0)
         rows[DRY, i] = max(rows[DRY, i] + numbers[LEARNING] * dt * rows[MOTOR, i] * y, 0.0)
@@ -179,10 +184,10 @@ def send(numbers: Array, seen: Seen, memory: Array, out: Array, limits: int) -> 
 
 
 @compiled
-def _begin(drives: Array, seen: Seen, rows: Array, M: Array, sent: Array) -> None:
+def _begin(drives: Array, seen: Seen, q: Array, rows: Array, M: Array, sent: Array) -> None:
     """The arm is at rest: what its gears bear beyond the nominal weight is a disturbance of the links."""
     for i in range(seen.q.size):
-        rows[Q, i], rows[S, i] = seen.q[i], seen.tau[i] / drives[STIFFNESS, i]
+        rows[Q, i], rows[S, i] = q[i], seen.tau[i] / drives[STIFFNESS, i]
         rows[LINK, i] = seen.bias[i] - seen.tau[i]
         for k in range(sent.shape[0]):
             sent[k, i] = seen.tau[i]
@@ -256,14 +261,14 @@ def step(drives: Array, M: Array, L: Array, rest: Array, f: Array, u: Array, dt:
 
 
 @compiled
-def _correct(numbers: Array, drives: Array, M: Array, seen: Seen, rows: Array) -> None:
+def _correct(numbers: Array, drives: Array, M: Array, seen: Seen, q: Array, rows: Array) -> None:
     """Correct state and disturbances by what is measured."""
     n, dt = seen.q.size, seen.dt_s
     a, b, g = filter_gains(numbers[LINK_STATE], numbers[LINK_CUTOFF], dt)
     a_m, b_m, g_m = filter_gains(numbers[MOTOR_STATE], numbers[MOTOR_CUTOFF], dt)
     e = scratch(n)
     for i in range(n):
-        e[i] = seen.q[i] - rows[Q, i]
+        e[i] = q[i] - rows[Q, i]
     for i in range(n):
         short = seen.tau[i] / drives[STIFFNESS, i] - rows[S, i]
         whole = e[i] + short

@@ -133,6 +133,7 @@ class DriveConfig(PartConfig):
             apparent_inertia=apparent,
             loop_damping=2.0 * self.loop_damping_ratio * np.sqrt(stiffness * apparent),
             torque_rate=float(rate),
+            at_motor=self.encoder == "motor",
         )
 
     def each(self, key: str, n: int) -> Array:
@@ -151,6 +152,7 @@ class Drive:
         apparent_inertia: B_s [kg m^2].
         loop_damping: D_s [N m s/rad].
         torque_rate: Fastest change of the commanded torque [N m/s].
+        at_motor: Whether joints are measured on the motors' side of the gears.
     """
 
     stiffness: Array
@@ -159,6 +161,7 @@ class Drive:
     apparent_inertia: Array
     loop_damping: Array
     torque_rate: float
+    at_motor: bool
 
 
 def real_drive(folder: Path) -> DriveConfig | None:

@@ -130,3 +130,12 @@ def test_keys_of_the_observer_are_those_of_both_laws():
     shared = set(ElasticObserverConfig.model_fields)
     assert shared < set(RcmElasticDynamicsConfig.model_fields)
     assert shared < set(JointElasticDynamicsConfig.model_fields)
+
+
+def test_encoders_on_the_motors_cost_it_little():
+    """The gears' deflection, up to 4 mrad, is known from their torques."""
+    settings = {"robot.drive.encoder": "motor", "task.duration_s": 4.0}
+    run = surgsim.run("circle_fr3", controller="rcm_elastic_dynamics", settings=settings)
+    assert run.trace.meta.ending.outcome is Outcome.COMPLETED
+    assert run.metrics["rcm_error_rms_mm"] < 0.1
+    assert run.metrics["tip_error_rms_mm"] < 0.15
