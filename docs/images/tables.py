@@ -13,10 +13,17 @@ from typing import Any
 
 import numpy as np
 import pyarrow.parquet as pq
+from ruamel.yaml import YAML
 
 ROOT = Path(__file__).resolve().parents[2]
 RESULTS = ROOT / "results" / "leaderboard"
-PAGES = ("README.md", "docs/robustness.md", "docs/peg_and_ring.md", "results/leaderboard/README.md")
+PAGES = (
+    "README.md",
+    "docs/robustness.md",
+    "docs/drives.md",
+    "docs/peg_and_ring.md",
+    "results/leaderboard/README.md",
+)
 _MARKED = r"(<!-- table (\w+) -->\n\n).*?(\n<!-- end -->)"
 _ARMS = {"lwr4plus": "LWR4+", "panda": "Panda"}
 
@@ -109,14 +116,87 @@ def _theatre(arm: str) -> str:
 
 
 def _theatre_short() -> str:
+    """A row for each controller over all arms of the theatre; best first, those that always fail last."""
     columns = [
         Column(heading="tip RMS, mean", metric="tip_error_rms_mm"),
+        Column(heading="tip RMS, worst", metric="tip_error_rms_mm", of=np.max),
         Column(heading="RCM RMS, mean", metric="rcm_error_rms_mm"),
+        Column(heading="RCM RMS, worst", metric="rcm_error_rms_mm", of=np.max),
         Column(heading="RCM max, worst", metric="rcm_error_max_mm", of=np.max),
-        Column(heading="force on the wall, RMS, mean [N]", metric="trocar_force_rms_n"),
     ]
-    scenario = "theatre_lwr4plus"
-    return by_controller("theatre", {scenario: columns}, (scenario, "rcm_error_rms_mm"))
+    return _over_arms(columns)
+
+
+def _over_arms(columns: Sequence[Column]) -> str:
+    names = dict.fromkeys(row["controller"] for row in rows_of("theatre"))
+    mine = {name: [row for row in rows_of("theatre") if row["controller"] == name] for name in names}
+    done = {name: [row for row in rows if row["outcome"] == "completed"] for name, rows in mine.items()}
+
+    def order(name: str) -> tuple[float, str]:
+        error = np.mean([row["rcm_error_rms_mm"] for row in done[name]]) if done[name] else np.inf
+        return float(error), name
+
+    head = ["controller", "completed", *(column.heading for column in columns)]
+    lines = [
+        [f"`{name}`", f"{len(done[name])} of {len(mine[name])}"]
+        + [f"{float(c.of([r[c.metric] for r in done[name]])):.3g}" if done[name] else "–" for c in columns]
+        for name in sorted(names, key=order)
+    ]
+    return table(head, lines)
+
+
+def _drives_arms() -> str:
+    """Ours and its rival of equal means, arm by arm."""
+    arms = {"fr3": "FR3", "panda": "Panda", "iiwa14": "iiwa14", "lwr4plus": "LWR4+"}
+    controllers = ("rcm_elastic_dynamics", "joint_elastic_dynamics", "joint_impedance_tuned")
+    lines = []
+    for arm, title in arms.items():
+        for name in controllers:
+            rows = [row for row in rows_of("theatre", f"theatre_{arm}") if row["controller"] == name]
+            done = [row for row in rows if row["outcome"] == "completed"]
+            worst = {
+                key: max(row[key] for row in done)
+                for key in ("tip_error_rms_mm", "rcm_error_rms_mm", "torque_rate_over_fraction")
+            }
+            cells = [f"{value:.3g}" for value in worst.values()]
+            lines.append([title, f"`{name}`", f"{len(done)} of {len(rows)}", *cells])
+    head = [
+        "arm",
+        "controller",
+        "completed",
+        "tip RMS, worst",
+        "RCM RMS, worst",
+        "ticks at the torque's rate",
+    ]
+    return table(head, lines)
+
+
+def _drives_levels() -> str:
+    """For each sweep and arm the mean RCM RMS of ours at every level."""
+    rows = [row for row in rows_of("drives") if row["controller"] == "rcm_elastic_dynamics"]
+    suite = YAML(typ="safe").load(ROOT / "scenarios" / "suites" / "drives.yaml")
+    lines = []
+    for name, sweep in suite["sweeps"].items():
+        for scenario, title in (("theatre_fr3", "FR3"), ("theatre_lwr4plus", "LWR4+")):
+            mine = [row for row in rows if row["sweep"] == name and row["scenario"] == scenario]
+            lines.append([sweep["label"], title, *_cells(mine, sweep["levels"])])
+    return table(["what", "arm", "RCM RMS / tip RMS at each level"], lines)
+
+
+def _cells(rows: Rows, levels: Sequence[float]) -> list[str]:
+    said = []
+    for level in levels:
+        here = [row for row in rows if np.isclose(row["level"], level)]
+        done = [row for row in here if row["outcome"] == "completed"]
+        lost = len(here) - len(done)
+        means = (
+            [np.mean([row[key] for row in done]) for key in ("rcm_error_rms_mm", "tip_error_rms_mm")]
+            if done
+            else []
+        )
+        told = f"{means[0]:.2g} / {means[1]:.2g}" if done else "–"
+        said.append(f"**{level:g}**: {told}" + (f" ({lost} of {len(here)} failed)" if lost else ""))
+    return ["; ".join(said)]
 
 
 def _breathing(kind: str, metrics: tuple[tuple[str, str], tuple[str, str]]) -> str:
@@ -145,6 +225,8 @@ FORCE = (("force RMS [N]", "trocar_force_rms_n"), ("max [N]", "trocar_force_max_
 TABLES: dict[str, Callable[[], str]] = {
     "nominal": _nominal,
     "theatre_short": _theatre_short,
+    "drives_arms": _drives_arms,
+    "drives_levels": _drives_levels,
     "theatre_ideal_lwr4plus": lambda: _theatre("lwr4plus"),
     "theatre_ideal_panda": lambda: _theatre("panda"),
     "breathing_tracked": lambda: _breathing("tracked", RCM),
