@@ -75,7 +75,7 @@ ONLY = {
     "pinocchio": ("surgsim.bench.libraries.with_pink",),
     "dqrobotics": ("surgsim.bench.libraries.with_dqrobotics",),
     "cmaes": ("surgsim.tuning.search",),
-    "ruamel": ("surgsim.scenario",),
+    "ruamel": ("surgsim.models.drive", "surgsim.scenario"),
     "argparse": ("surgsim.cli",),
     "rich": ("surgsim.cli",),
     "matplotlib": ("surgsim.adopt", "surgsim.api", "surgsim.studies"),

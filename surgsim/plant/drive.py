@@ -36,7 +36,7 @@ from surgsim.models.build import Scene
 from surgsim.models.drive import DriveConfig
 from surgsim.models.robot import joint_names, motor_names
 from surgsim.plant.part import PlantPart
-from surgsim.tick.algebra import back_substitute, factor
+from surgsim.tick.algebra import back_substitute_rows, factor, times
 from surgsim.tick.arrays import Record, World
 from surgsim.tick.mujoco_calls import mj_fullM
 from surgsim.tick.overlay import laid_over, overlay
@@ -117,10 +117,10 @@ LAW, LAW_SIZE = overlay(Law)
 ACCOUNT, ACCOUNT_SIZE = overlay(Account)
 STIFFNESS, GEAR, ROTOR, LOOP, COULOMB, STATIC, VISCOUS, RIPPLE, BIAS, WAVE, LINK_DAMPING = range(11)
 """Rows of the gains: K, D, B, D_s, friction, ripple, the torque sensor's bias and ripple, links' damping."""
-THETA, OMEGA, MOTOR, COMMAND, OTHERS, FRICTION, MOVED = range(7)
+THETA, OMEGA, MOTOR, COMMAND, OTHERS, FRICTION, MOVED, TAKEN = range(8)
 """Rows of the memory: motor's position and speed, its torque, the command that acts, other forces on the
-links, friction as observed, the links' correction of a step."""
-_ROWS = 7
+links, friction as observed, the links' correction of a step, friction and ripple as they are."""
+_ROWS = 8
 """After them the sensed torques and gear speeds of the last substeps (MOST_DELAY, 2, n), and the inertia."""
 
 
@@ -159,20 +159,25 @@ def move(gains: Array, world: World, memory: Array, out: Array) -> int:
     qpos, qvel = vector(world.qpos, world.nq), vector(world.qvel, nv)
     bias, passive = vector(world.qfrc_bias, nv), vector(law.passive, nv)
     x, v, rest, mean, gain = scratch(n), scratch(n), scratch(n), scratch(n), scratch(n)
-    M, S, hs = scratch_matrix(n, n), scratch_matrix(n, n), law.h / law.substeps
+    push, momentum, inverse = scratch(n), scratch(n), scratch_matrix(n, n)
+    S, hs = scratch_matrix(n, n), law.h / law.substeps
     for i in range(n):
         x[i], v[i] = qpos[world.first_qpos + i], qvel[first + i]
         rest[i] = passive[first + i] - bias[first + i] + others[i]
-        mean[i] = gain[i] = 0.0
+        mean[i] = gain[i] = momentum[i] = 0.0
         for j in range(n):
-            M[i, j] = S[i, j] = whole[first + i, first + j] / hs
+            S[i, j] = whole[first + i, first + j] / hs
+            inverse[i, j] = 1.0 if i == j else 0.0
+            momentum[i] += S[i, j] * qvel[first + j]
         beta, kappa = B[i] / hs, 0.25 * K[i] * hs + 0.5 * D[i]
         S[i, i] += 0.5 * damping[i] + kappa * beta / (beta + kappa)
     if not factor(S):
         return RANK_LOST
+    back_substitute_rows(S, inverse)
     for _ in range(law.substeps):
         _close_loop(gains, law, memory, x, v)
-        _substep(gains, law, memory, M, S, rest, x, v, gain, mean)
+        _push_motors(gains, law, memory, x, v, gain, push)
+        _substep(gains, law, memory, inverse, momentum, rest, push, x, v, gain, mean)
     ctrl = vector(world.ctrl, world.first_ctrl + n)
     for i in range(n):
         ctrl[world.first_ctrl + i] = mean[i] / law.substeps
@@ -181,13 +186,30 @@ def move(gains: Array, world: World, memory: Array, out: Array) -> int:
 
 
 @compiled
+def _push_motors(gains: Array, law: Law, memory: Array, x: Array, v: Array, gain: Array, push: Array) -> None:
+    """Fill `push` (n,), what w+ is but for kappa v+, times beta + kappa; book what friction takes."""
+    n, hs = x.size, law.h / law.substeps
+    K, D = _row(gains, LAW_SIZE, STIFFNESS, n), _row(gains, LAW_SIZE, GEAR, n)
+    B, taken = _row(gains, LAW_SIZE, ROTOR, n), _row(memory, ACCOUNT_SIZE, TAKEN, n)
+    theta, omega = _row(memory, ACCOUNT_SIZE, THETA, n), _row(memory, ACCOUNT_SIZE, OMEGA, n)
+    motor = _row(memory, ACCOUNT_SIZE, MOTOR, n)
+    for i in range(n):
+        beta, kappa = B[i] / hs, 0.25 * K[i] * hs + 0.5 * D[i]
+        free = beta * omega[i] + motor[i] - K[i] * (theta[i] - x[i]) - kappa * (omega[i] - v[i])
+        # a motor that stands is held against what would move it, the link going on as in the last substep
+        taken[i] = _friction(gains, law, n, i, theta[i], omega[i], free + kappa * (v[i] + gain[i]))
+        push[i] = free - taken[i]
+
+
+@compiled
 def _substep(
     gains: Array,
     law: Law,
     memory: Array,
-    M: Array,
-    S: Array,
+    inverse: Array,
+    momentum: Array,
     rest: Array,
+    push: Array,
     x: Array,
     v: Array,
     gain: Array,
@@ -199,12 +221,13 @@ def _substep(
         gains: Numbers of the drives.
         law: Their beginning.
         memory: Of the drives, changed.
-        M: Inertia of the links over the substep (n, n).
-        S: Cholesky factor of the equation for v+ (n, n).
+        inverse: Of the equation for v+ (n, n).
+        momentum: M v / h_s (n,) [N m], changed.
         rest: Other forces on the links (n,) [N m].
+        push: Of `_push_motors` (n,) [N m].
         x: Positions of the links (n,) [rad], changed.
         v: Velocities of the links (n,) [rad/s], changed.
-        gain: What the links' velocities gained in the last substep (n,) [rad/s], changed.
+        gain: What the links' velocities gain in the substep (n,) [rad/s], filled.
         mean: Sum of the torques that act on the links (n,) [N m], added to.
     """
     account, n, hs = memory[:ACCOUNT_SIZE].view(ACCOUNT)[0], x.size, law.h / law.substeps
@@ -212,29 +235,22 @@ def _substep(
     B, damping = _row(gains, LAW_SIZE, ROTOR, n), _row(gains, LAW_SIZE, LINK_DAMPING, n)
     theta, omega = _row(memory, ACCOUNT_SIZE, THETA, n), _row(memory, ACCOUNT_SIZE, OMEGA, n)
     motor, known = _row(memory, ACCOUNT_SIZE, MOTOR, n), _row(memory, ACCOUNT_SIZE, FRICTION, n)
-    push, turn, after = scratch(n), scratch(n), scratch(n)
+    taken, right, after = _row(memory, ACCOUNT_SIZE, TAKEN, n), scratch(n), scratch(n)
     for i in range(n):
         beta, kappa = B[i] / hs, 0.25 * K[i] * hs + 0.5 * D[i]
-        slip, spring = omega[i] - v[i], K[i] * (theta[i] - x[i])
-        free = beta * omega[i] + motor[i] - spring - kappa * slip
-        # a motor that stands is held against what would move it, the link going on as in the last substep
-        turn[i] = _friction(gains, law, n, i, theta[i], omega[i], free + kappa * (v[i] + gain[i]))
-        push[i] = free - turn[i]
-        momentum = 0.0
-        for j in range(n):
-            momentum += M[i, j] * v[j]
-        after[i] = momentum + rest[i] - 0.5 * damping[i] * v[i]
-        after[i] += spring + kappa * slip + kappa * push[i] / (beta + kappa)
-    back_substitute(S, after)
+        right[i] = momentum[i] + rest[i] - 0.5 * damping[i] * v[i] + K[i] * (theta[i] - x[i])
+        right[i] += kappa * (omega[i] - v[i] + push[i] / (beta + kappa))
+    times(inverse, right, after)
     for i in range(n):
         beta, kappa = B[i] / hs, 0.25 * K[i] * hs + 0.5 * D[i]
         w = (push[i] + kappa * after[i]) / (beta + kappa)
         torque = K[i] * (theta[i] - x[i]) + kappa * (omega[i] + w - v[i] - after[i])
         speed, link = 0.5 * (omega[i] + w), 0.5 * (v[i] + after[i])
         account.work += hs * motor[i] * speed
-        account.loss += hs * (turn[i] * speed + D[i] * (speed - link) * (speed - link))
+        account.loss += hs * (taken[i] * speed + D[i] * (speed - link) * (speed - link))
         account.given += hs * torque * link
         mean[i] += torque - damping[i] * link
+        momentum[i] += rest[i] + torque - damping[i] * link
         known[i] += law.observes * (motor[i] - torque - beta * (w - omega[i]) - known[i])
         theta[i] += hs * speed
         x[i] += hs * link
@@ -261,7 +277,9 @@ def _close_loop(gains: Array, law: Law, memory: Array, x: Array, v: Array) -> No
             ring[2 * n * k + i] = ring[2 * n * (k - 1) + i]
     for i in range(n):
         s, relative = theta[i] - x[i], omega[i] - v[i]
-        ring[i] = K[i] * s + D[i] * relative + bias[i] + wave[i] * math.sin(law.waves * theta[i])
+        ring[i] = K[i] * s + D[i] * relative + bias[i]
+        if wave[i] != 0.0:  # a sine costs as much as the rest
+            ring[i] += wave[i] * math.sin(law.waves * theta[i])
         ring[n + i] = relative
     late = 2 * n * law.delay
     for i in range(n):
@@ -277,9 +295,12 @@ def _friction(gains: Array, law: Law, n: int, i: int, theta: float, omega: float
     """Friction and ripple of a motor over a substep [N m]; `free` [N m] is what would have to be held."""
     coulomb, static = gains[LAW_SIZE + COULOMB * n + i], gains[LAW_SIZE + STATIC * n + i]
     smooth: float = gains[LAW_SIZE + VISCOUS * n + i] * omega
-    smooth += gains[LAW_SIZE + RIPPLE * n + i] * math.sin(law.waves * theta)
-    ratio = omega / law.stribeck
-    most = coulomb + (static - coulomb) * math.exp(-ratio * ratio)
+    ripple, most = gains[LAW_SIZE + RIPPLE * n + i], coulomb
+    if ripple != 0.0:
+        smooth += ripple * math.sin(law.waves * theta)
+    if static > coulomb:
+        ratio = omega / law.stribeck
+        most += (static - coulomb) * math.exp(-ratio * ratio)
     dry: float = min(max(free - smooth, -most), most)
     return smooth + dry
 
