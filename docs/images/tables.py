@@ -4,6 +4,7 @@ A table stands in a page between `<!-- table NAME -->` and `<!-- end -->`. `test
 against the results.
 """
 
+import json
 import re
 import sys
 from collections.abc import Callable, Mapping, Sequence
@@ -178,15 +179,21 @@ def _drives_levels() -> str:
     lines = []
     for name, sweep in suite["sweeps"].items():
         for scenario, title in (("theatre_fr3", "FR3"), ("theatre_lwr4plus", "LWR4+")):
-            mine = [row for row in rows if row["sweep"] == name and row["scenario"] == scenario]
-            lines.append([sweep["label"], title, *_cells(mine, sweep["levels"])])
+            mine = [row for row in rows if name in levels(row) and row["scenario"] == scenario]
+            lines.append([sweep["label"], title, *_cells(mine, name, sweep["levels"])])
     return table(["what", "arm", "RCM RMS / tip RMS at each level"], lines)
 
 
-def _cells(rows: Rows, levels: Sequence[float]) -> list[str]:
+def levels(row: Mapping[str, Any]) -> dict[str, float]:
+    """The levels of a run, by the name of the sweep."""
+    found: dict[str, float] = json.loads(row["parameters"])
+    return found
+
+
+def _cells(rows: Rows, name: str, at: Sequence[float]) -> list[str]:
     said = []
-    for level in levels:
-        here = [row for row in rows if np.isclose(row["level"], level)]
+    for level in at:
+        here = [row for row in rows if np.isclose(levels(row)[name], level)]
         done = [row for row in here if row["outcome"] == "completed"]
         lost = len(here) - len(done)
         means = (
