@@ -7,8 +7,8 @@ Gauss's rule, whose weights are p/2:
     x = p (1/2 -+ 1/sqrt(12)),    K = E I / (p/2)                          of each hinge
     w(a) = sum_i (a - x_i)+ M(x_i) / K_i  =  integral of (a - x) M(x) / E I over 0 <= x <= a
 
-So what a force or a moment at the tip does to the tip, deflection and slope, is exact. For forces and points in
-between the rule is cut off; `docs/robustness.md` has figures.
+So what a force or a moment at the tip does to the tip, deflection and slope, is exact. For forces and points
+in between the rule is cut off; `docs/robustness.md` has figures.
 
 MuJoCo takes springs explicitly: v+ = v + h M^-1 f(q), q+ = q + h v+. With the armature h² K / 4 on a hinge
 that scheme is the trapezoidal rule,

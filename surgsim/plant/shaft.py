@@ -77,7 +77,7 @@ def _direction(begin: Array, end: Array, u: Array) -> float:
     """Fill `u` (3,) with the direction from the one to the other; their distance [m]."""
     for i in range(3):
         u[i] = end[i] - begin[i]
-    length = np.sqrt(dot(u, u))
+    length: float = np.sqrt(dot(u, u))
     for i in range(3):
         u[i] /= length
     return length

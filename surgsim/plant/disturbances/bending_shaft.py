@@ -146,4 +146,4 @@ def _contact_ratio(scene: Scene, wall: WallConfig, h: float) -> float:
     places = np.linspace(0.1 * length, length - FUNNEL_LENGTH_M, 50)
     mobility = 1.0 / lateral_masses(scene, places, h).min() + 1.0 / wall.mass_kg
     k = wall.lateral_stiffness_n_per_m + wall.contact_stiffness_n_per_m
-    return (k * h**2 + 2.0 * wall.contact_damping_n_s_per_m * h) * mobility
+    return float((k * h**2 + 2.0 * wall.contact_damping_n_s_per_m * h) * mobility)

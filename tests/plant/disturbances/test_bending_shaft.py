@@ -1,5 +1,7 @@
 """A shaft that bends: its deflections against beam theory, its swinging, and what counts as true."""
 
+from itertools import pairwise
+
 import mujoco
 import numpy as np
 import pytest
@@ -11,6 +13,7 @@ from surgsim.models.config import InstrumentConfig, RobotConfig, SceneConfig, Tr
 from surgsim.plant.disturbances.bending_shaft import BendingShaftConfig
 from surgsim.plant.disturbances.push import BODY, DISTANCE, SITE, PushConfig
 from surgsim.plant.dynamic import DynamicPlant
+from surgsim.recording.scene import body_poses, rebuild
 from surgsim.simulate.loop import Simulation, simulate
 from surgsim.simulate.setup import prepare
 from surgsim.spatial import shaft_distance
@@ -41,7 +44,7 @@ def scene_of(config=None, *, h=0.0005, length=0.4, port=None, mass=0.35):
 
 
 def beam(load, at, length):
-    """Deflection of a cantilever of E I = 1 at `at` under a unit force at `load` [m/N], and its slope there."""
+    """Deflection [m/N] and slope at `at` of a cantilever of E I = 1 under a unit force at `load`."""
     near = min(load, at)
     slope = load * near - 0.5 * near**2
     return 0.5 * load * near**2 - near**3 / 6.0 + (at - near) * slope, slope
@@ -57,7 +60,9 @@ class Held:
         self.data.qpos[scene.qpos_ids] = Q
         first = int(scene.dof_ids[-1]) + 1
         self.bends = slice(first, first + len(BEND_JOINTS))
-        self.stiffness = np.array([float(np.ravel(self.model.joint(name).stiffness)[0]) for name in BEND_JOINTS])
+        names = BEND_JOINTS if self.model.nv > 10 else ()
+        joints = [self.model.joint(name) for name in names]
+        self.stiffness = np.array([float(np.ravel(joint.stiffness)[0]) for joint in joints])
         mujoco.mj_forward(self.model, self.data)
         self.axes = self.data.site_xmat[scene.shaft_entry_site].reshape(3, 3).copy()
         self.entry = self.data.site_xpos[scene.shaft_entry_site].copy()
@@ -99,7 +104,7 @@ def test_a_force_at_the_tip_deflects_it_as_a_beam(config, rigidity, length, dire
     )
     turned = held.axes.T @ held.data.site_xmat[held.scene.tip_site].reshape(3, 3)[:, 2]
     slope = length**2 / (2.0 * rigidity)
-    np.testing.assert_allclose(turned[:2], slope * force[:2], rtol=1e-4)
+    np.testing.assert_allclose(turned[:2], slope * force[:2], rtol=1e-4, atol=1e-12)
 
 
 def test_the_stiffness_of_three_tubes_at_three_lengths():
@@ -120,10 +125,14 @@ def test_a_force_at_the_port_and_one_at_the_tip_deflect_both_places(config, rigi
     tip_force, port_force = np.array([0.02, 0.0, 0.0]), np.array([0.0, 0.03, 0.0])
     held.load([(length, tip_force), (port, port_force)], length)
     for a in (port, length):
-        wanted = np.array([0.02 * beam(length, a, length)[0], 0.03 * beam(port, a, length)[0], 0.0]) / rigidity
+        wanted = (
+            np.array([0.02 * beam(length, a, length)[0], 0.03 * beam(port, a, length)[0], 0.0]) / rigidity
+        )
         np.testing.assert_allclose(held.deflection(a, length), wanted, rtol=0.02, atol=2e-9)
     turned = held.axes.T @ held.data.site_xmat[held.scene.tip_site].reshape(3, 3)[:, 2]
-    slopes = np.array([0.02 * beam(length, length, length)[1], 0.03 * beam(port, length, length)[1]]) / rigidity
+    slopes = (
+        np.array([0.02 * beam(length, length, length)[1], 0.03 * beam(port, length, length)[1]]) / rigidity
+    )
     np.testing.assert_allclose(turned[0], slopes[0], rtol=1e-3)
     np.testing.assert_allclose(turned[1], slopes[1], rtol=0.05)
 
@@ -195,9 +204,9 @@ def test_the_controllers_model_stays_as_it_is(scenario):
     assert bent.arm.scene is build_arm(scenario().scene)
 
 
-def _plant(h, *, wall=None, ledger=True, config=None):
+def _plant(h, *, wall=None, ledger=True, config=None, aside=0.0):
     axis_home = Held(scene_of(h=h)[0])
-    place = axis_home.entry + 0.22 * axis_home.axes[:, 2]
+    place = axis_home.entry + axis_home.axes @ [aside, 0.0, 0.22]
     port = TrocarConfig(position_m=tuple(place), axis=tuple(-axis_home.axes[:, 2]), wall=wall)
     scene, parts = scene_of(config or BendingShaftConfig(), h=h, port=port)
     return DynamicPlant(scene, 0.001, parts, energy_ledger=ledger)
@@ -210,7 +219,7 @@ def test_energy_only_falls_where_nothing_drives_it(wall):
     for h in (0.0005, 0.00025):
         plant = _plant(h, wall=wall)
         plant.reset(Q)
-        names = [name for block in plant.columns for name in block.names]
+        names = [name for block in plant.columns for name in block.columns]
         rows = []
         for _ in range(250):
             plant.step(np.zeros(7), np.zeros(7))
@@ -220,11 +229,12 @@ def test_energy_only_falls_where_nothing_drives_it(wall):
         total = total + stored
         residual = np.abs([r["energy_residual_j"] for r in rows]).max()
         kinetic = max(r["energy_kinetic_j"] for r in rows)
-        assert kinetic > 0.1
+        assert kinetic > 10.0
+        assert wall is None or max(r["energy_spring_j"] for r in rows) > 0.1
         risen.append((max(0.0, float((total - np.minimum.accumulate(total)).max())), residual / kinetic))
-    assert risen[-1][0] < 2e-3
-    assert risen[-1][1] < 5e-3
-    assert risen[1][1] < 0.7 * risen[0][1] + 1e-6
+    assert max(rise for rise, _ in risen) < 1e-9
+    assert risen[0][1] < 5e-4
+    assert risen[1][1] < 0.6 * risen[0][1]  # of first order: Coriolis forces, as of the rigid arm
 
 
 def test_the_run_begins_at_rest_under_its_own_weight():
@@ -256,7 +266,7 @@ def test_the_rcm_error_is_the_distance_of_the_bent_shaft():
         truth = plant.truth()
         joints = [scene.model.joint(name).id for name in BEND_JOINTS[::2]]
         ends = np.array([data.site_xpos[scene.shaft_entry_site], *data.xanchor[joints], truth.p_WT])
-        least = min(_segment_distance(truth.p_WC, a, b) for a, b in zip(ends[:-1], ends[1:], strict=True))
+        least = min(_segment_distance(truth.p_WC, a, b) for a, b in pairwise(ends))
         error = float(shaft_distance(truth.p_WC, truth.p_WT, truth.p_WR))
         assert error == pytest.approx(least, rel=2e-3, abs=1e-9)
         straight = float(shaft_distance(truth.p_WC, truth.p_WT, ends[0]))
@@ -272,14 +282,13 @@ def _segment_distance(p, a, b):
 def test_pressed_on_the_wall_it_bends_by_the_walls_force():
     """The arm is held 3 mm beside the port: wall, shaft and bore are in balance."""
     wall = WallConfig(seal_friction_n=0.0)
-    plant = _plant(0.00025, wall=wall, ledger=False, config=BendingShaftConfig(damping_ratio=0.3))
+    calm = BendingShaftConfig(damping_ratio=0.3)
+    plant = _plant(0.00025, wall=wall, ledger=False, config=calm, aside=0.003)
     scene, model = plant._scene, plant._scene.model
     model.dof_armature[scene.dof_ids] = 1e9
     model.opt.gravity[:] = 0.0
-    data, start = plant.data, plant.reset(Q)
-    assert start.t_s == 0.0
-    data.mocap_pos[scene.port_mocap] += 0.0
-    plant.world.port_home[:] += 0.003 * Held(scene_of()[0]).axes[:, 0]
+    model.qpos_spring[scene.cannula_qpos_ids] = 0.0  # they bear the cannula's weight
+    plant.reset(Q)
     for _ in range(1500):
         plant.step(np.zeros(7), np.zeros(7))
     truth = plant.truth()
@@ -294,25 +303,34 @@ def test_pressed_on_the_wall_it_bends_by_the_walls_force():
 
 
 @pytest.mark.parametrize("drive", ["ideal", "real"])
-def test_results_do_not_depend_on_the_timestep(scenario, drive):
-    """Under tissue, on ideal and real drives: the paths of tips differ by less than half a micrometre."""
-    tips = []
-    for h in (0.0005, 0.00025, 0.000125):
-        bent = "disturbances=[{type: bending_shaft}, {type: tissue}]"
-        made = scenario(
-            f"simulation.timestep_s={h}", bent, f"robot.drive={drive}", controller="joint_impedance"
-        )
-        trace = simulate(made)
-        assert trace.meta.ending.outcome is Outcome.COMPLETED
-        tips.append(trace.block("tip"))
-    coarse, fine = (np.abs(tip - tips[2]).max() for tip in tips[:2])
-    assert fine < 0.6 * coarse
-    assert coarse < 2e-5
+def test_the_timestep_matters_as_little_as_to_a_rigid_shaft(scenario, drive):
+    """Under tissue; the errors fall with the timestep."""
+
+    def errors(shaft):
+        tips = []
+        for h in (0.0005, 0.00025, 0.0000625):
+            made = scenario(
+                f"simulation.timestep_s={h}",
+                f"disturbances=[{shaft}{{type: tissue}}]",
+                f"robot.drive={drive}",
+                controller="joint_impedance",
+            )
+            trace = simulate(made)
+            assert trace.meta.ending.outcome is Outcome.COMPLETED
+            tips.append(trace.block("tip"))
+        return [np.abs(tip - tips[-1]).max() for tip in tips[:-1]]
+
+    stiff, bent = errors(""), errors("{type: bending_shaft}, ")
+    assert bent[0] < 1.5 * stiff[0]
+    assert bent[1] < 0.65 * bent[0]
 
 
 def test_on_stiff_gears_it_moves_as_on_ideal_drives(scenario):
     """What the drives take the arm's inertia for is what MuJoCo's joints have."""
-    stiff = "{stiffness_nm_per_rad: 1.0e9, rotor_inertia_kg_m2: 0.4, inertia_shaping: 1.0, loop_delay_s: 0.0}"
+    stiff = (
+        "{stiffness_nm_per_rad: 1.0e8, rotor_inertia_kg_m2: 0.4, inertia_shaping: 1.0, loop_delay_s: 0.0, "
+        "loop_cutoff_hz: 1.0e5, coulomb_nm: 0.0}"
+    )
     paths = []
     for drive in ("ideal", stiff):
         made = scenario("simulation.timestep_s=0.0005", f"robot.drive={drive}", _SHAFT)
@@ -337,7 +355,17 @@ _SHAFT = "disturbances=[{type: bending_shaft}]"
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ((_SHAFT, "instrument=null"), "needs an instrument, and the scenario has none"),
+        (
+            (
+                _SHAFT,
+                "instrument=null",
+                "trocar=null",
+                "controller=mink",
+                "start.q_rad=[1.6, -0.4, 0.2, 1.5, 0.1, -1.0, 0.3]",
+                "task.start_m=null",
+            ),
+            "needs an instrument, and the scenario has none",
+        ),
         (
             (_SHAFT, "simulation.timestep_s=0.001", "trocar.wall={}"),
             "the shaft in the wall's bore needs a shorter timestep_s than 0.001: 0.0005 will do",
@@ -351,7 +379,11 @@ _SHAFT = "disturbances=[{type: bending_shaft}]"
             "inner_diameter_m 0.008 must be below the outer one, 0.008",
         ),
         (
-            ("disturbances=[{type: bending_shaft, young_pa: 1.0e13}]", "instrument.shaft_diameter_m=0.015"),
+            (
+                "disturbances=[{type: bending_shaft, young_pa: 1.0e13}]",
+                "instrument.shaft_length_m=0.3",
+                "instrument.mass_kg=0.2",
+            ),
             "the shaft swings at .* Hz, which needs a timestep_s of at most .*, not 0.001",
         ),
         (
@@ -376,3 +408,38 @@ def test_a_push_on_the_shaft_acts_on_the_piece_that_has_the_point():
     assert names == ["instrument", "shaft1", "shaft2", "shaft3", "shaft4"]
     for a in (0.01, 0.1, 0.2, 0.3, 0.39):
         np.testing.assert_allclose(held.point(a, 0.4)[0], held.entry + a * held.axes[:, 2], atol=1e-12)
+
+
+def test_a_run_can_be_forked_and_its_scene_is_rebuilt(scenario):
+    """On real drives, behind a wall: what the shaft does is in MuJoCo's data and in the trace."""
+    made = scenario("simulation.timestep_s=0.0005", "robot.drive=real", "trocar.wall={}", _SHAFT)
+    one = Simulation(prepare(made))
+    one.advance(50)
+    other = one.fork()
+    for simulation in (one, other):
+        simulation.advance(60)
+    trace = one.trace()
+    assert trace.equals(other.trace())
+    rows = np.array([0, 40, len(trace) - 1])
+    scene = rebuild(made)
+    jaws = body_poses(scene, trace, rows).position[:, scene.model.body("jaws").id]
+    np.testing.assert_allclose(jaws, trace.block("tip")[rows], atol=1e-9)
+    assert np.abs(trace["bend1_x_rad"]).max() > 1e-6
+
+
+def test_an_instrument_from_a_file_does_not_bend(scenario, tmp_path):
+    file = tmp_path / "hook.xml"
+    file.write_text(
+        '<mujoco model="hook"><worldbody><body name="hook"><inertial pos="0 0 0.1" mass="0.3" '
+        'diaginertia="0.003 0.003 0.0001"/><site name="shaft_entry" pos="0 0 0.04"/>'
+        '<site name="tip" pos="0 0 0.44"/></body></worldbody></mujoco>'
+    )
+    with pytest.raises(SurgsimError, match="is for the shipped instrument, not for one from a file"):
+        prepare(scenario(_SHAFT, f"instrument={{mjcf: {file}}}"))
+
+
+def test_stiff_tissue_needs_a_shorter_timestep_at_a_light_tip(scenario):
+    stiff = "{type: tissue, stiffness_n_per_m: 20000.0, drag_n_s_per_m: 50.0}"
+    prepare(scenario(f"disturbances=[{stiff}]"))
+    with pytest.raises(SurgsimError, match=r"k h\^2 \+ b h must be at most 0\.01\d* kg"):
+        prepare(scenario(f"disturbances=[{{type: bending_shaft}}, {stiff}]"))
