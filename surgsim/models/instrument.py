@@ -56,10 +56,14 @@ def rod_masses(config: InstrumentConfig) -> tuple[float, float]:
 
     m_a + m_s = m and m_a a/2 + m_s (a + s/2) = m c, with adapter length a, shaft length s, centre of mass c.
     """
-    a, s = config.adapter_length_m, config.shaft_length_m
-    low, high = a / 2, a + s / 2
-    shaft = config.mass_kg * (config.com_m - low) / (high - low)
-    return config.mass_kg - shaft, shaft
+    return two_rods(config.mass_kg, config.com_m, config.adapter_length_m, config.shaft_length_m)
+
+
+def two_rods(mass: float, com: float, adapter: float, shaft: float) -> tuple[float, float]:
+    """`rod_masses` of a mass [kg] with its centre at `com` [m], on an adapter and a shaft so long [m]."""
+    low, high = adapter / 2, adapter + shaft / 2
+    of_shaft = mass * (com - low) / (high - low)
+    return mass - of_shaft, of_shaft
 
 
 def rod_inertia(config: InstrumentConfig, adapter_radius_m: float) -> Array:

@@ -16,7 +16,8 @@ clearance c (half of bore minus shaft diameter) and a funnel that widens it over
 
 F and -F act at the same point C, so that p' = (n - p_s u) . v and s' = u . v with the velocity v of the
 cannula relative to the shaft's point at C: the elastic parts have the potentials k p²/2 and sigma_0 z²/2, and
-everything else takes energy out. The law is exact on the circle and has no tangential part. A tip that misses
+everything else takes energy out. Of a shaft that bends, the axis is that of its piece in the bore
+(`surgsim.plant.shaft`). The law is exact on the circle and has no tangential part. A tip that misses
 the funnel's mouth stays outside the bore until it is drawn back.
 
 Own modelling; measured ranges of the parameters and their sources are in docs/physical_port.md.
@@ -28,11 +29,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surgsim.compiled import compiled
+from surgsim.models.bending import BEND_JOINTS
 from surgsim.models.config import WallConfig
+from surgsim.plant.shaft import shaft_line
 from surgsim.tick.algebra import cross, dot
 from surgsim.tick.arrays import Record, World
 from surgsim.tick.scratch import scratch
-from surgsim.tick.views import body_place, doubles, site_place, vector
+from surgsim.tick.views import body_place, doubles, vector
 
 Array = NDArray[np.float64]
 FUNNEL_LENGTH_M = 0.010
@@ -43,6 +46,7 @@ FADE_M = 20e-6
 """p_0: damping fades in over this penetration, so that the force is continuous at touch."""
 START_REACH_M = 0.005
 """A shaft that starts this near to the bore is in it."""
+_BENDS = str(len(BEND_JOINTS))
 
 
 class Push(Record):
@@ -50,8 +54,10 @@ class Push(Record):
 
     Attributes:
         contact_arm: Contact's joint torques (n,) [N m].
+        contact_shaft: Its torques at the joints of a shaft that bends (8,) [N m].
         contact_cannula: Its force on the cannula's slides (3,) [N].
         seal_arm: Seal's joint torques (n,) [N m].
+        seal_shaft: Its torques at the joints of a shaft that bends (8,) [N m].
         seal_cannula: Its force on the slides (3,) [N].
         stored: Elastic energy k p²/2 and sigma_0 z²/2 (2,) [J].
         force: F of the shaft on the cannula (3,) [N].
@@ -60,16 +66,20 @@ class Push(Record):
 
     SHAPES: ClassVar[dict[str, str]] = {
         "contact_arm": "n",
+        "contact_shaft": _BENDS,
         "contact_cannula": "3",
         "seal_arm": "n",
+        "seal_shaft": _BENDS,
         "seal_cannula": "3",
         "stored": "2",
         "force": "3",
         "memory": "4",
     }
     contact_arm: Array
+    contact_shaft: Array
     contact_cannula: Array
     seal_arm: Array
+    seal_shaft: Array
     seal_cannula: Array
     stored: Array
     force: Array
@@ -83,6 +93,7 @@ class Bore(Record):
         cannula: The cannula's body.
         first_slide: Where the cannula's joints begin.
         first_dof: Where their velocities begin.
+        bends: Joints of a shaft that bends, which follow the arm's; 0: it is stiff.
         parameters: From `law` (6,).
         frame: Rotation of the port's frame (3, 3).
         stiffness: Of the cannula's slides (3,) [N/m].
@@ -102,6 +113,7 @@ class Bore(Record):
     cannula: int
     first_slide: int
     first_dof: int
+    bends: int
     parameters: Array
     frame: Array
     stiffness: Array
@@ -149,6 +161,8 @@ def act(bore: Bore, world: World) -> None:
     for i in range(push.contact_arm.size):
         applied[world.first_dof + i] += push.contact_arm[i]
         applied[world.first_dof + i] += push.seal_arm[i]
+    for i in range(bore.bends):
+        applied[world.first_dof + world.q.size + i] += push.contact_shaft[i] + push.seal_shaft[i]
     for i in range(3):
         applied[bore.first_dof + i] += push.contact_cannula[i]
         applied[bore.first_dof + i] += push.seal_cannula[i]
@@ -169,11 +183,14 @@ def fill_push(bore: Bore, world: World, out: Push) -> None:
     """Generalized forces of contact and seal, by the Jacobian's transpose; `out.memory` goes on."""
     contact, seal, velocity = np.zeros(3), np.zeros(3), np.zeros(3)
     centre = body_place(world, bore.cannula)
-    entry, tip = site_place(world, world.entry), site_place(world, world.tip)
-    _relative_velocity(bore, world, centre, velocity)
+    entry, tip = scratch(3), scratch(3)
+    moved = shaft_line(world, bore.bends, centre, entry, tip)
+    _relative_velocity(bore, world, centre, moved, velocity)
     _forces(entry, tip, centre, velocity, bore.parameters, out.memory, contact, seal, out.stored)
     _generalized(contact, bore, world, centre, out.contact_arm, out.contact_cannula)
     _generalized(seal, bore, world, centre, out.seal_arm, out.seal_cannula)
+    _bend(contact, world, centre, moved, out.contact_shaft)
+    _bend(seal, world, centre, moved, out.seal_shaft)
     for i in range(3):
         out.force[i] = contact[i] + seal[i]
 
@@ -251,14 +268,17 @@ def _rub(u: Array, velocity: Array, parameters: Array, memory: Array, seal: Arra
 
 
 @compiled
-def _relative_velocity(bore: Bore, world: World, centre: Array, v: Array) -> None:
-    """Velocity of the cannula relative to the shaft's point at its centre (3,) [m/s]."""
+def _relative_velocity(bore: Bore, world: World, centre: Array, moved: int, v: Array) -> None:
+    """Velocity of the cannula relative to the shaft's point at its centre (3,) [m/s].
+
+    That point is moved by the arm's joints and the first `moved` of the shaft's.
+    """
     axes, anchors = doubles(world.xaxis, world.njnt, 3), doubles(world.xanchor, world.njnt, 3)
     qvel, arm, turned = vector(world.qvel, world.nv), scratch(3), scratch(3)
     for i in range(3):
         for k in range(3):
             v[k] += qvel[bore.first_dof + i] * axes[bore.first_slide + i, k]
-    for i in range(world.q.size):
+    for i in range(world.q.size + moved):
         for k in range(3):
             arm[k] = centre[k] - anchors[world.first_joint + i, k]
         cross(axes[world.first_joint + i], arm, turned)
@@ -278,3 +298,18 @@ def _generalized(force: Array, bore: Bore, world: World, centre: Array, arm: Arr
         arm[i] = -dot(turned, force)
     for i in range(3):
         cannula[i] = dot(axes[bore.first_slide + i], force)
+
+
+@compiled
+def _bend(force: Array, world: World, centre: Array, moved: int, shaft: Array) -> None:
+    """Fill `shaft` (8,) with J^T of the reaction on the shaft; only its first `moved` joints feel it."""
+    axes, anchors = doubles(world.xaxis, world.njnt, 3), doubles(world.xanchor, world.njnt, 3)
+    lever, turned = scratch(3), scratch(3)
+    for i in range(shaft.size):
+        shaft[i] = 0.0
+    for i in range(moved):
+        joint = world.first_joint + world.q.size + i
+        for k in range(3):
+            lever[k] = centre[k] - anchors[joint, k]
+        cross(axes[joint], lever, turned)
+        shaft[i] = -dot(turned, force)

@@ -19,6 +19,10 @@ as stiff, and the links as light, as they are: nothing of it limits the physics 
 are solved for v+ with one Cholesky factor a step. Dry friction holds a motor that it can hold: tau_f is what
 brings w+ to rest, or, where that is more than the friction is, the friction against the motion.
 
+The joints b of a shaft that bends are moved as MuJoCo moves them, by the forces r_b on them and with their
+damping D_b in A = M_bb + h D_b. For the arm's joints a, M and r are then M_aa - M_ab A^-1 M_ba and
+r_a - M_ab A^-1 r_b.
+
 Drives: `surgsim.models.drive`.
 """
 
@@ -36,7 +40,8 @@ from surgsim.models.build import Scene
 from surgsim.models.drive import DriveConfig
 from surgsim.models.robot import joint_names, motor_names
 from surgsim.plant.part import PlantPart
-from surgsim.tick.algebra import back_substitute_rows, factor, times
+from surgsim.plant.shaft import bend_joints
+from surgsim.tick.algebra import back_substitute, back_substitute_rows, factor, times
 from surgsim.tick.arrays import Record, World
 from surgsim.tick.mujoco_calls import mj_fullM
 from surgsim.tick.overlay import laid_over, overlay
@@ -67,6 +72,8 @@ class Law(Record):
         delay: Of the torque loop, in substeps.
         past_rate: What becomes of a torque that changes too fast.
         at_motor: Whether joints are measured on the motor's side.
+        bends: Joints of a shaft that bends, which follow the arm's.
+        damping: Address of the damping of all joints.
         h: Physics step [s].
         ratio: B / B_s.
         keep: Share of the motor's torque that is kept over a substep, exp(-2 pi f h_s).
@@ -85,6 +92,8 @@ class Law(Record):
     delay: int
     past_rate: int
     at_motor: int
+    bends: int
+    damping: int
     h: float
     ratio: float
     keep: float
@@ -121,7 +130,8 @@ THETA, OMEGA, MOTOR, COMMAND, OTHERS, FRICTION, MOVED, TAKEN = range(8)
 """Rows of the memory: motor's position and speed, its torque, the command that acts, other forces on the
 links, friction as observed, the links' correction of a step, friction and ripple as they are."""
 _ROWS = 8
-"""After them the sensed torques and gear speeds of the last substeps (MOST_DELAY, 2, n), and the inertia."""
+"""After them the sensed torques and gear speeds of the last substeps (MOST_DELAY, 2, n), the inertia of all
+joints (nv, nv), and the other forces on those of a shaft that bends."""
 
 
 @compiled
@@ -151,7 +161,8 @@ def receive(gains: Array, world: World, memory: Array, out: Array) -> int:
 def move(gains: Array, world: World, memory: Array, out: Array) -> int:
     """Integrate motors and links over a physics step; MuJoCo's motors are given the gears' mean torques."""
     law, n, nv, first = gains[:LAW_SIZE].view(LAW)[0], world.q.size, world.nv, world.first_dof
-    whole = memory[ACCOUNT_SIZE + (_ROWS + 2 * MOST_DELAY) * n :].reshape(nv, nv)
+    tail = ACCOUNT_SIZE + (_ROWS + 2 * MOST_DELAY) * n
+    whole = memory[tail : tail + nv * nv].reshape(nv, nv)
     mj_fullM(world.mj_model, world.mj_data, whole.ctypes.data)
     K, D = _row(gains, LAW_SIZE, STIFFNESS, n), _row(gains, LAW_SIZE, GEAR, n)
     B, damping = _row(gains, LAW_SIZE, ROTOR, n), _row(gains, LAW_SIZE, LINK_DAMPING, n)
@@ -165,6 +176,9 @@ def move(gains: Array, world: World, memory: Array, out: Array) -> int:
         x[i], v[i] = qpos[world.first_qpos + i], qvel[first + i]
         rest[i] = passive[first + i] - bias[first + i] + others[i]
         mean[i] = gain[i] = momentum[i] = 0.0
+    if law.bends > 0 and not _take_out_shaft(law, world, whole, memory[tail + nv * nv :], rest):
+        return RANK_LOST
+    for i in range(n):
         for j in range(n):
             S[i, j] = whole[first + i, first + j] / hs
             inverse[i, j] = 1.0 if i == j else 0.0
@@ -183,6 +197,44 @@ def move(gains: Array, world: World, memory: Array, out: Array) -> int:
         ctrl[world.first_ctrl + i] = mean[i] / law.substeps
         moved[i] = x[i] - qpos[world.first_qpos + i] - law.h * v[i]
     return GOES_ON
+
+
+@compiled
+def _take_out_shaft(law: Law, world: World, whole: Array, others: Array, rest: Array) -> bool:
+    """What the arm's joints feel of a shaft whose joints follow theirs; False where that has no inertia.
+
+    Args:
+        law: Of the drives.
+        world: The plant's.
+        whole: Inertia of all joints (nv, nv); the arm's part is changed.
+        others: Other forces on the shaft's joints (bends,) [N m].
+        rest: Other forces on the links (n,) [N m], changed.
+    """
+    n, b, begin = world.q.size, law.bends, world.first_dof + world.q.size
+    damping, passive = vector(law.damping, world.nv), vector(law.passive, world.nv)
+    bias, A, column = vector(world.qfrc_bias, world.nv), scratch_matrix(b, b), scratch(b)
+    for i in range(b):
+        for j in range(b):
+            A[i, j] = whole[begin + i, begin + j]
+        A[i, i] += law.h * damping[begin + i]
+    if not factor(A):
+        return False
+    for i in range(b):
+        column[i] = passive[begin + i] - bias[begin + i] + others[i]
+    back_substitute(A, column)
+    for i in range(n):
+        for k in range(b):
+            rest[i] -= whole[world.first_dof + i, begin + k] * column[k]
+    for j in range(n):
+        for k in range(b):
+            column[k] = whole[begin + k, world.first_dof + j]
+        back_substitute(A, column)
+        for i in range(n):
+            for k in range(b):
+                whole[world.first_dof + i, world.first_dof + j] -= (
+                    whole[world.first_dof + i, begin + k] * column[k]
+                )
+    return True
 
 
 @compiled
@@ -317,6 +369,10 @@ def end_step(gains: Array, world: World, memory: Array, out: Array) -> int:
         at = first + i
         qpos[world.first_qpos + i] += moved[i]
         others[i] = smooth[at] - passive[at] + bias[at] - actuator[at] + constraint[at]
+    of_shaft = memory[ACCOUNT_SIZE + (_ROWS + 2 * MOST_DELAY) * n + nv * nv :]
+    for i in range(law.bends):
+        at = first + n + i
+        of_shaft[i] = smooth[at] - passive[at] + bias[at] + constraint[at]
     return GOES_ON
 
 
@@ -432,13 +488,16 @@ class JointDrives(PlantPart):
         law.rate = drive.torque_rate * dt_s
         cutoff = c.command_cutoff_hz
         law.command_keep = 0.0 if cutoff is None else math.exp(-2.0 * math.pi * cutoff * dt_s)
-        self.memory = np.zeros(ACCOUNT_SIZE + (_ROWS + 2 * MOST_DELAY) * n + scene.model.nv**2)
+        law.bends = bend_joints(scene)
+        rows_size = (_ROWS + 2 * MOST_DELAY) * n
+        self.memory = np.zeros(ACCOUNT_SIZE + rows_size + scene.model.nv**2 + law.bends)
 
     def start(self, scene: Scene, data: mujoco.MjData, rng: np.random.Generator, dt_s: float) -> None:
         """The arm is at rest, held by its drives."""
         n, law = self._n, laid_over(Law, self.gains)
         for name in ("passive", "smooth", "actuator", "constraint"):
             law[name] = getattr(data, f"qfrc_{name}").ctypes.data
+        law.damping = scene.model.dof_damping.ctypes.data
         posed = mujoco.MjData(scene.model)
         posed.qpos[:] = data.qpos
         mujoco.mj_forward(scene.model, posed)

@@ -23,6 +23,7 @@ from surgsim.plant.other_joints import joint_columns
 from surgsim.plant.part import BLOCK_TICKS, PlantPart
 from surgsim.plant.port import forget, new_bore
 from surgsim.plant.records import world_of
+from surgsim.plant.shaft import see_bent
 from surgsim.plant.state import State
 from surgsim.plant.truth import NOWHERE, Truth
 from surgsim.plant.world import (
@@ -100,6 +101,7 @@ def clear_forces(world: World, bore: Bore, hooks: Hooks, t_s: float) -> int:
 def look(world: World, bore: Bore, hooks: Hooks) -> int:
     """Fill what is true and what is measured, after `mj_step1`."""
     see_arm(world)
+    see_bent(world, bore.bends)
     for i in range(3):
         world.f_T_m[i] = world.f_T[i]
     if world.walled:

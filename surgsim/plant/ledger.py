@@ -23,7 +23,7 @@ import numpy as np
 
 from surgsim.compiled import compiled
 from surgsim.models.build import Scene
-from surgsim.plant.bore import Bore
+from surgsim.plant.bore import Bore, Push
 from surgsim.tick.arrays import Array, Record, World
 from surgsim.tick.mujoco_calls import mj_mulM
 from surgsim.tick.overlay import laid_over, overlay
@@ -48,8 +48,10 @@ class Law(Record):
         spring: Of `qfrc_spring`.
         friction: Of the dry friction of the joints (nv,) [N m].
         contact_arm: Of the bore's forces, as the following; see `surgsim.plant.bore.Bore`.
+        contact_shaft: Contact's at the joints of a shaft that bends.
         contact_cannula: Contact's on the cannula.
         seal_arm: Seal's on the arm.
+        seal_shaft: Seal's at the joints of a shaft that bends.
         seal_cannula: Seal's on the cannula.
         drive: Force of the wall's motion.
         offset: How far its place of rest has moved.
@@ -59,6 +61,7 @@ class Law(Record):
         wall_damping: Of the slides.
         walled: Whether there is a wall.
         cannula: Where the slides' velocities begin.
+        bends: Number of the joints of a shaft that bends.
         rubs: Whether joints have dry friction.
         springs: Number of springs.
         h: Physics step [s].
@@ -73,8 +76,10 @@ class Law(Record):
     spring: int
     friction: int
     contact_arm: int
+    contact_shaft: int
     contact_cannula: int
     seal_arm: int
+    seal_shaft: int
     seal_cannula: int
     drive: int
     offset: int
@@ -84,6 +89,7 @@ class Law(Record):
     wall_damping: int
     walled: int
     cannula: int
+    bends: int
     rubs: int
     springs: int
     h: float
@@ -193,6 +199,9 @@ def _read_forces(gains: Array, law: Law, world: World, memory: Array, state: Sta
     contact, seal = vector(law.contact_arm, n), vector(law.seal_arm, n)
     for i in range(n):
         _put_bore(now, world.first_dof + i, contact[i], seal[i], 0.0)
+    contact, seal = vector(law.contact_shaft, law.bends), vector(law.seal_shaft, law.bends)
+    for i in range(law.bends):
+        _put_bore(now, world.first_dof + n + i, contact[i], seal[i], 0.0)
     contact, seal, drive = vector(law.contact_cannula, 3), vector(law.seal_cannula, 3), vector(law.drive, 3)
     stiffness, wall_damping = vector(law.wall_stiffness, 3), vector(law.wall_damping, 3)
     offset, velocity, spring = vector(law.offset, 3), vector(law.velocity, 3), vector(law.spring, nv)
@@ -334,8 +343,8 @@ class EnergyLedger:
         law.h = model.opt.timestep
         if bore is None or scene.wall is None:
             return
-        law.walled, law.cannula = 1, bore.first_dof
-        for name in ("contact_arm", "contact_cannula", "seal_arm", "seal_cannula", "stored"):
+        law.walled, law.cannula, law.bends = 1, bore.first_dof, bore.bends
+        for name in (*(name for name in Push.SHAPES if name.startswith(("contact", "seal"))), "stored"):
             law[name] = getattr(bore.acting, name).ctypes.data
         for name in ("drive", "offset", "velocity"):
             law[name] = getattr(bore, name).ctypes.data

@@ -11,14 +11,16 @@ from numpy.typing import NDArray
 
 from surgsim.models.build import Scene, span
 from surgsim.plant.bore import Bore, Push, law
+from surgsim.plant.shaft import bend_joints
 from surgsim.tick.arrays import new
 
 Array = NDArray[np.float64]
 
 
 def new_bore(scene: Scene) -> Bore:
-    """The record of the law in `scene`; zeros without a wall."""
+    """The record of the law in `scene`; without a wall zeros, but for how many joints the shaft has."""
     bore = new(Bore, len(scene.dof_ids))
+    bore.bends = bend_joints(scene)
     if scene.wall is None:
         return bore
     model, dofs = scene.model, span(scene.cannula_dof_ids)

@@ -7,6 +7,7 @@ DISTURBANCES = Catalog(
     "surgsim.disturbances",
     {
         "actuation_delay": "surgsim.plant.disturbances.actuation_delay:ActuationDelayConfig",
+        "bending_shaft": "surgsim.plant.disturbances.bending_shaft:BendingShaftConfig",
         "breathing": "surgsim.plant.disturbances.breathing:BreathingConfig",
         "calibration_error": "surgsim.plant.disturbances.calibration_error:CalibrationErrorConfig",
         "gravity_error": "surgsim.plant.disturbances.gravity_error:GravityErrorConfig",

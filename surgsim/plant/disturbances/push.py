@@ -13,6 +13,7 @@ from surgsim.models.build import Scene
 from surgsim.models.config import Vec3
 from surgsim.models.robot import link_names
 from surgsim.plant.disturbances.base import Direction, Disturbance, DisturbanceConfig, pointed
+from surgsim.plant.shaft import place_on_shaft
 from surgsim.tick.arrays import World
 from surgsim.tick.scratch import scratch
 from surgsim.tick.status import GOES_ON
@@ -95,10 +96,10 @@ class Push(Disturbance):
 
     def attach(self, scene: Scene, dt_s: float) -> None:
         """Find the body that is pushed."""
-        gains, tip, at = self.gains, scene.tip_site, self._c.at
+        gains, at = self.gains, self._c.at
         if at in ("elbow", "wrist"):
             links = link_names(scene.dof_ids.size)
             gains[BODY] = int(scene.model.body(links[(len(links) - 1) // 2 if at == "elbow" else -2]).id)
             return
-        gains[BODY], gains[SITE] = int(scene.model.site_bodyid[tip]), tip
-        gains[DISTANCE] = self._c.distance_m if at == "shaft" else 0.0
+        back = self._c.distance_m if at == "shaft" else 0.0
+        gains[BODY], gains[SITE], gains[DISTANCE] = place_on_shaft(scene, back)

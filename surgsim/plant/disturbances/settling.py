@@ -5,6 +5,8 @@ import numpy as np
 
 from surgsim.models.build import Scene
 from surgsim.plant.bore import FUNNEL_LENGTH_M, FUNNEL_SLOPE
+from surgsim.plant.records import world_of
+from surgsim.plant.shaft import bend_joints, shaft_line
 from surgsim.spatial import Array
 
 _TURNS = 8
@@ -33,7 +35,9 @@ def settle_cannula(scene: Scene, data: mujoco.MjData) -> None:
     frame = data.xmat[cannula].reshape(3, 3)
     stiffness = (wall.lateral_stiffness_n_per_m,) * 2 + (wall.axial_stiffness_n_per_m,)
     compliance = frame @ np.diag(1.0 / np.array(stiffness)) @ frame.T
-    entry, tip = data.site_xpos[scene.shaft_entry_site], data.site_xpos[scene.tip_site]
+    entry, tip = np.zeros(3), np.zeros(3)
+    world = world_of(scene, data, float(model.opt.timestep))
+    shaft_line(world, bend_joints(scene), data.xpos[cannula], entry, tip)
     d = _balance(
         data.xpos[cannula] - entry,
         tip - entry,

@@ -10,8 +10,10 @@ from pydantic import Field, model_validator
 
 from surgsim.compiled import compiled
 from surgsim.errors import SurgsimError
+from surgsim.models.build import Scene
 from surgsim.models.config import Vec3
 from surgsim.plant.disturbances.base import Disturbance, DisturbanceConfig, Spread, spread_factor
+from surgsim.plant.shaft import bend_joints, lateral_masses, piece_lengths
 from surgsim.spatial import unit
 from surgsim.tick.algebra import dot
 from surgsim.tick.arrays import World
@@ -124,18 +126,27 @@ class Tissue(Disturbance):
         self.gains = np.concatenate((point, normal, law))
 
     def modify(self, spec: mujoco.MjSpec) -> None:
-        """Refuse a scene without an instrument, and a timestep that the tissue's law cannot be stepped with.
+        """Refuse a scene without an instrument."""
+        if all(body.name != "jaws" for body in spec.bodies):
+            raise SurgsimError("disturbance 'tissue' needs an instrument, and the scenario has none")
+
+    def attach(self, scene: Scene, dt_s: float) -> None:
+        """Refuse a timestep that the tissue's law cannot be stepped with.
 
         An explicit spring k with damping b on the mass m is stable for k h^2 + 2 b h < 4 m with timestep h; a
         quarter of that is asked for.
+
+        Raises:
+            SurgsimError: With what the tip bears.
         """
-        if all(body.name != "jaws" for body in spec.bodies):
-            raise SurgsimError("disturbance 'tissue' needs an instrument, and the scenario has none")
-        h = float(spec.option.timestep)
+        h, lightest = float(scene.model.opt.timestep), LIGHTEST_TIP_KG
+        if bend_joints(scene):
+            of_shaft = lateral_masses(scene, piece_lengths(scene).sum(keepdims=True), h)
+            lightest = float(1.0 / (1.0 / lightest + 1.0 / of_shaft[0]))
         k, b = float(self.gains[LAW][0]), float(self.gains[LAW][1:].max())
-        if k * h**2 + b * h > LIGHTEST_TIP_KG:
+        if k * h**2 + b * h > lightest:
             raise SurgsimError(
-                f"disturbance 'tissue': k h^2 + b h must be at most {LIGHTEST_TIP_KG:g} kg with "
+                f"disturbance 'tissue': k h^2 + b h must be at most {lightest:.2g} kg with "
                 f"stiffness k {k:g} N/m, damping or drag b {b:g} N s/m and timestep_s h {h:g}, not "
                 f"{k * h**2 + b * h:.3g} kg"
             )
