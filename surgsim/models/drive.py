@@ -17,11 +17,11 @@ Redundant and Flexible-Joint Robots (2008), section 3.2, for the torque loop.
 import json
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field, NonNegativeFloat, PositiveFloat, ValidationError, model_validator
+from pydantic import Field, NonNegativeFloat, PositiveFloat, ValidationError
 from ruamel.yaml import YAML, YAMLError
 
 from surgsim.catalog import PartConfig
@@ -93,21 +93,17 @@ class DriveConfig(PartConfig):
         """These drives, with what is not given here as in `real`.
 
         Raises:
-            ValueError: If stiffness or inertia is known from neither.
+            ValueError: If stiffness or inertia is known from neither, or static is below dry friction.
         """
         given = {key: getattr(self, key) for key in self.model_fields_set}
         every = {} if real is None else {key: getattr(real, key) for key in real.model_fields_set}
-        whole = type(self).model_construct(**{**_defaults(), **every, **given})
+        whole = type(self)(**{**every, **given})
         for key in ("stiffness_nm_per_rad", "rotor_inertia_kg_m2"):
             if getattr(whole, key) is None:
                 raise ValueError(f"give {key}: the robot's folder has no {FILE} that says it")
+        if whole.static_nm is not None and _below(whole.static_nm, whole.coulomb_nm):
+            raise ValueError(f"static_nm {whole.static_nm} must be at least coulomb_nm {whole.coulomb_nm}")
         return whole
-
-    @model_validator(mode="after")
-    def _friction_is_more_at_rest(self) -> Self:
-        if self.static_nm is not None and np.any(np.array(self.static_nm) < np.array(self.coulomb_nm)):
-            raise ValueError(f"static_nm {self.static_nm} must be at least coulomb_nm {self.coulomb_nm}")
-        return self
 
     def check_lengths(self, n: int) -> None:
         """Refuse a list that has not one item for each of `n` joints.
@@ -180,5 +176,7 @@ def real_drive(folder: Path) -> DriveConfig | None:
         raise ValueError(f"{file}: {' '.join(str(error).split())}") from error
 
 
-def _defaults() -> dict[str, Any]:
-    return {name: field.default for name, field in DriveConfig.model_fields.items()}
+def _below(low: NotNegative, high: NotNegative) -> bool:
+    """Whether a number is below its counterpart; lists of other lengths are found elsewhere."""
+    a, b = np.atleast_1d(low), np.atleast_1d(high)
+    return bool(1 in (a.size, b.size, a.size / b.size) and np.any(a < b))
