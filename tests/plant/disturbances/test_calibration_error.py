@@ -15,7 +15,7 @@ from surgsim.scenario.load import load_scenario
 from surgsim.simulate.loop import Simulation, simulate
 from surgsim.simulate.setup import prepare
 
-OFF = dict.fromkeys(CalibrationErrorConfig.model_fields.keys() - {"type"}, 0.0)
+OFF = {key: 0.0 for key in CalibrationErrorConfig.model_fields if key != "type"}
 LARGE = CalibrationErrorConfig(**{key: 0.02 for key in OFF})
 """Two centimetres and a degree of everything: a formula of first order would be found out."""
 HELD = HolderConfig(position_m=(0.03, 0.0, 0.02), quaternion_wxyz=(0.9, 0.0, 0.3, 0.1))
@@ -251,7 +251,7 @@ def walled():
     items = ", ".join(f"{key}: {value}" for key, value in {**OFF, "tool_tip_m": 3e-3}.items())
     calibration = f"disturbances=[{{type: calibration_error, {items}}}]"
     return load_scenario(
-        "theatre_lwr4plus", assignments=[calibration, "task.duration_s=0.6", "task.ramp_s=0.1"], seed=1
+        "theatre_ideal_lwr4plus", assignments=[calibration, "task.duration_s=0.6", "task.ramp_s=0.1"], seed=1
     )
 
 
