@@ -7,8 +7,8 @@ All of it from joint positions, gear torques and the commands that were sent. Th
     B_s w' = u - K s - D_s (w - v) - f                 f: on the motors, behind the torque loop
     q' = v,  s' = w - v
 
-stepped over a control period T by the trapezoidal rule, M and c as they are at its beginning. With beta =
-B_s/T, kappa = K T/4, mu = kappa + D_s/2 the motors are eliminated,
+stepped over a control period T by the trapezoidal rule, M and c as they were predicted for its beginning.
+With beta = B_s/T, kappa = K T/4, mu = kappa + D_s/2 the motors are eliminated,
 
     w+ = (P + mu v+)/(beta + mu),   P = beta w + u - f - K s - mu (w - v)
     (M/T + D_l/2 + kappa beta/(beta + mu)) v+
@@ -39,7 +39,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, NonNegativeFloat, PositiveFloat
 
-from surgsim.catalog import PartConfig
+from surgsim.catalog import PartConfig, Surroundings
 from surgsim.compiled import compiled
 from surgsim.control.filters import filter_gains
 from surgsim.models.arm import ArmModel
@@ -54,9 +54,10 @@ Array = NDArray[np.float64]
 Q, V, S, W, LINK, MOTOR, REST, DRY, FRICTION = range(9)
 """Rows of the memory (n,): the state, d, f_r, -c, F, F y; after them M (n, n), then the commands sent."""
 ROWS = 9
-LINK_STATE, LINK_CUTOFF, MOTOR_STATE, MOTOR_CUTOFF, BAND, LEARNING, DELAY, RATE, AT_MOTOR = range(9)
+LINK_STATE, LINK_CUTOFF, MOTOR_STATE, MOTOR_CUTOFF, BAND, LEARNING, DELAY, RATE = range(8)
 """Places of the numbers; after them the rows of the drives."""
-DRIVES = 9
+LONGEST_PERIOD_S = 0.004
+DRIVES = 8
 STIFFNESS, APPARENT, LOOP, DAMPING, ARMATURE = range(5)
 """Rows of the drives (5, n): K, B_s, D_s, D_l, and B_s as it is part of the nominal inertia."""
 
@@ -86,6 +87,14 @@ class ElasticObserverConfig(PartConfig):
     stiffness_factor: PositiveFloat = 1.0
     inertia_factor: PositiveFloat = 1.0
 
+    def check(self, scenario: Surroundings) -> None:
+        """Refuse control periods over which the gears cannot be followed."""
+        if scenario.control_period_s > LONGEST_PERIOD_S:
+            raise ValueError(
+                f"a torque law that follows elastic gears needs a control_period_s of at most "
+                f"{LONGEST_PERIOD_S:g}, not {scenario.control_period_s:g}"
+            )
+
     def numbers(self, arm: ArmModel) -> Array:
         """The observer's numbers for an arm; ideal drives are taken for stiff ones with light motors."""
         n = arm.limits.torque.size
@@ -99,7 +108,6 @@ class ElasticObserverConfig(PartConfig):
             self.friction_learning_per_s,
             float(self.delay_ticks),
             drive.torque_rate,
-            float(drive.at_motor),
         )
         part_of_inertia = np.zeros(n) if arm.drive is None else drive.apparent_inertia
         inertia = self.inertia_factor * drive.apparent_inertia
@@ -122,7 +130,6 @@ def _as_good_as_rigid(n: int) -> Drive:
         apparent_inertia=inertia,
         loop_damping=np.sqrt(stiffness * inertia),
         torque_rate=math.inf,
-        at_motor=False,
     )
 
 
@@ -133,18 +140,15 @@ def look_ahead(numbers: Array, seen: Seen, memory: Array, d: Array) -> int:
     rows, M = memory[: ROWS * n].reshape((ROWS, n)), memory[ROWS * n : (ROWS + n) * n].reshape((n, n))
     sent, drives = memory[(ROWS + n) * n :].reshape((delay + 1, n)), numbers[DRIVES:].reshape((5, n))
     x, rest, f, L = scratch_matrix(4, n), scratch(n), scratch(n), scratch_matrix(n, n)
-    q = scratch(n)
-    for i in range(n):  # where encoders sit on the motors, the links are a gear's deflection behind
-        q[i] = seen.q[i] - numbers[AT_MOTOR] * seen.tau[i] / drives[STIFFNESS, i]
     if seen.first:
-        _begin(drives, seen, q, rows, M, sent)
+        _begin(drives, seen, rows, M, sent)
     if not factor_step(drives, M, dt, L):
         return RANK_LOST
     for i in range(n):
         rest[i], f[i] = rows[REST, i] + rows[LINK, i], rows[MOTOR, i] + rows[FRICTION, i]
     if not seen.first:
         step(drives, M, L, rest, f, sent[delay], dt, rows)
-        _correct(numbers, drives, M, seen, q, rows)
+        _correct(numbers, drives, M, seen, rows)
     for i in range(n):
         y = min(max(seen.qdot_ref[i] / numbers[BAND], -1.0), 1.0)
         rows[DRY, i] = max(rows[DRY, i] + numbers[LEARNING] * dt * rows[MOTOR, i] * y, 0.0)
@@ -184,10 +188,10 @@ def send(numbers: Array, seen: Seen, memory: Array, out: Array, limits: int) -> 
 
 
 @compiled
-def _begin(drives: Array, seen: Seen, q: Array, rows: Array, M: Array, sent: Array) -> None:
+def _begin(drives: Array, seen: Seen, rows: Array, M: Array, sent: Array) -> None:
     """The arm is at rest: what its gears bear beyond the nominal weight is a disturbance of the links."""
     for i in range(seen.q.size):
-        rows[Q, i], rows[S, i] = q[i], seen.tau[i] / drives[STIFFNESS, i]
+        rows[Q, i], rows[S, i] = seen.q[i], seen.tau[i] / drives[STIFFNESS, i]
         rows[LINK, i] = seen.bias[i] - seen.tau[i]
         for k in range(sent.shape[0]):
             sent[k, i] = seen.tau[i]
@@ -261,14 +265,14 @@ def step(drives: Array, M: Array, L: Array, rest: Array, f: Array, u: Array, dt:
 
 
 @compiled
-def _correct(numbers: Array, drives: Array, M: Array, seen: Seen, q: Array, rows: Array) -> None:
+def _correct(numbers: Array, drives: Array, M: Array, seen: Seen, rows: Array) -> None:
     """Correct state and disturbances by what is measured."""
     n, dt = seen.q.size, seen.dt_s
     a, b, g = filter_gains(numbers[LINK_STATE], numbers[LINK_CUTOFF], dt)
     a_m, b_m, g_m = filter_gains(numbers[MOTOR_STATE], numbers[MOTOR_CUTOFF], dt)
     e = scratch(n)
     for i in range(n):
-        e[i] = q[i] - rows[Q, i]
+        e[i] = seen.q[i] - rows[Q, i]
     for i in range(n):
         short = seen.tau[i] / drives[STIFFNESS, i] - rows[S, i]
         whole = e[i] + short

@@ -4,6 +4,7 @@ A controller never sees the plant's data. It evaluates its own copy of the robot
 the payload, friction or inertia errors that a scenario gives the plant.
 """
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -93,6 +94,13 @@ class ArmModel:
     def drive(self) -> Drive | None:
         """What is known of the joints' drives; None where they are ideal."""
         return self._drive
+
+    @property
+    def locked_frequency(self) -> float:
+        """The lowest sqrt(K / B_s) of its drives [rad/s], a motor on its gear; infinite if they are ideal."""
+        if self._drive is None:
+            return math.inf
+        return float(np.sqrt(self._drive.stiffness / self._drive.apparent_inertia).min())
 
     @cached_property
     def rolls_shaft(self) -> bool:

@@ -81,9 +81,9 @@ class RobotConfig(ArmFileConfig):
         return self
 
     def _complete_drive(self) -> None:
-        """Fill in what the robot's folder says of its drives."""
+        """Fill in what the folder of the robot's file says of its drives."""
         try:
-            own = None if self.name is None else real_drive(robot_file(self.name).parent)
+            own = real_drive((self.file[0] if self.name is None else robot_file(self.name)).parent)
             given = DriveConfig() if isinstance(self.drive, str) else self.drive
             object.__setattr__(self, "drive", given.on(own))  # frozen, but still being made
         except ValueError as error:

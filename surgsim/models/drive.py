@@ -55,7 +55,8 @@ class DriveConfig(PartConfig):
         ripple_per_turn: Its periods in a turn of the joint.
         sensor_bias_nm: Bias of each torque sensor, its sign drawn [N m].
         sensor_ripple_nm: Amplitude of each torque sensor's ripple [N m].
-        encoder: Side of the gear on which joint positions and velocities are measured.
+        encoder: Side of the gear on which the encoders sit. On the motors' side the position is reported less
+            the measured torque over K, as arms do, and the velocity as it is there.
         torque_rate_nm_per_s: Fastest change of the commanded torque that the arm's interface takes [N m/s];
             null: any.
         past_torque_rate: What the interface does with a faster one: `clip` it, `stop` the run with an outcome
@@ -129,7 +130,6 @@ class DriveConfig(PartConfig):
             apparent_inertia=apparent,
             loop_damping=2.0 * self.loop_damping_ratio * np.sqrt(stiffness * apparent),
             torque_rate=float(rate),
-            at_motor=self.encoder == "motor",
         )
 
     def each(self, key: str, n: int) -> Array:
@@ -148,7 +148,6 @@ class Drive:
         apparent_inertia: B_s [kg m^2].
         loop_damping: D_s [N m s/rad].
         torque_rate: Fastest change of the commanded torque [N m/s].
-        at_motor: Whether joints are measured on the motors' side of the gears.
     """
 
     stiffness: Array
@@ -157,7 +156,6 @@ class Drive:
     apparent_inertia: Array
     loop_damping: Array
     torque_rate: float
-    at_motor: bool
 
 
 def real_drive(folder: Path) -> DriveConfig | None:

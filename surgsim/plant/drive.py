@@ -39,6 +39,7 @@ from surgsim.compiled import compiled
 from surgsim.models.build import Scene
 from surgsim.models.drive import DriveConfig
 from surgsim.models.robot import joint_names, motor_names
+from surgsim.plant.disturbances.base import copied
 from surgsim.plant.part import PlantPart
 from surgsim.plant.shaft import bend_joints
 from surgsim.tick.algebra import back_substitute, back_substitute_rows, factor, times
@@ -52,8 +53,6 @@ from surgsim.tick.views import vector
 Array = NDArray[np.float64]
 LOOP_S = 1e-4
 """Period of the torque loop, and longest substep [s]."""
-MOST_DELAY = 20
-"""Longest delay of the torque loop in its periods."""
 LAST = 10
 """Rank in the chain of `actuate`: what arrives at the drives."""
 _BEFORE_ALL = -1
@@ -130,8 +129,8 @@ THETA, OMEGA, MOTOR, COMMAND, OTHERS, FRICTION, MOVED, TAKEN = range(8)
 """Rows of the memory: motor's position and speed, its torque, the command that acts, other forces on the
 links, friction as observed, the links' correction of a step, friction and ripple as they are."""
 _ROWS = 8
-"""After them the sensed torques and gear speeds of the last substeps (MOST_DELAY, 2, n), the inertia of all
-joints (nv, nv), and the other forces on those of a shaft that bends."""
+"""After them the inertia of all joints (nv, nv), the other forces on those of a shaft that bends, and the
+sensed torques and gear speeds of the last substeps (delay + 1, 2, n)."""
 
 
 @compiled
@@ -141,15 +140,20 @@ def _row(array: Array, begin: int, row: int, n: int) -> Array:
 
 @compiled
 def receive(gains: Array, world: World, memory: Array, out: Array) -> int:
-    """What the interface makes of the command: its low-pass, then its limit of the torque's rate."""
+    """What the interface makes of the command: its low-pass, then its limit of the torque's rate.
+
+    The first command is where both begin. Once the reflex has told, the stop that follows is clipped.
+    """
     law, account, n = gains[:LAW_SIZE].view(LAW)[0], memory[:ACCOUNT_SIZE].view(ACCOUNT)[0], world.q.size
     acting = _row(memory, ACCOUNT_SIZE, COMMAND, n)
     status = GOES_ON
     for i in range(n):
         wanted = law.command_keep * acting[i] + (1.0 - law.command_keep) * world.torque[i]
-        if law.past_rate == CLIP:
+        if world.tick == 0:
+            wanted = world.torque[i]
+        elif law.past_rate == CLIP or account.told:
             wanted = min(max(wanted, acting[i] - law.rate), acting[i] + law.rate)
-        elif law.past_rate == STOP and abs(wanted - acting[i]) > law.rate * (1.0 + 1e-9) and not account.told:
+        elif law.past_rate == STOP and abs(wanted - acting[i]) > law.rate * (1.0 + 1e-9):
             status = TORQUE_RATE
         acting[i] = world.torque[i] = wanted
     if status != GOES_ON:
@@ -161,7 +165,7 @@ def receive(gains: Array, world: World, memory: Array, out: Array) -> int:
 def move(gains: Array, world: World, memory: Array, out: Array) -> int:
     """Integrate motors and links over a physics step; MuJoCo's motors are given the gears' mean torques."""
     law, n, nv, first = gains[:LAW_SIZE].view(LAW)[0], world.q.size, world.nv, world.first_dof
-    tail = ACCOUNT_SIZE + (_ROWS + 2 * MOST_DELAY) * n
+    tail = ACCOUNT_SIZE + _ROWS * n
     whole = memory[tail : tail + nv * nv].reshape(nv, nv)
     mj_fullM(world.mj_model, world.mj_data, whole.ctypes.data)
     K, D = _row(gains, LAW_SIZE, STIFFNESS, n), _row(gains, LAW_SIZE, GEAR, n)
@@ -172,11 +176,15 @@ def move(gains: Array, world: World, memory: Array, out: Array) -> int:
     x, v, rest, mean, gain = scratch(n), scratch(n), scratch(n), scratch(n), scratch(n)
     push, momentum, inverse = scratch(n), scratch(n), scratch_matrix(n, n)
     S, hs = scratch_matrix(n, n), law.h / law.substeps
+    ring = memory[tail + nv * nv + law.bends :]
+    sensed = ring[:n]
     for i in range(n):
         x[i], v[i] = qpos[world.first_qpos + i], qvel[first + i]
         rest[i] = passive[first + i] - bias[first + i] + others[i]
         mean[i] = gain[i] = momentum[i] = 0.0
-    if law.bends > 0 and not _take_out_shaft(law, world, whole, memory[tail + nv * nv :], rest):
+    if law.bends > 0 and not _take_out_shaft(
+        law, world, whole, memory[tail + nv * nv : tail + nv * nv + law.bends], rest
+    ):
         return RANK_LOST
     for i in range(n):
         for j in range(n):
@@ -189,9 +197,9 @@ def move(gains: Array, world: World, memory: Array, out: Array) -> int:
         return RANK_LOST
     back_substitute_rows(S, inverse)
     for _ in range(law.substeps):
-        _close_loop(gains, law, memory, x, v)
+        _close_loop(gains, law, memory, ring, x, v)
         _push_motors(gains, law, memory, x, v, gain, push)
-        _substep(gains, law, memory, inverse, momentum, rest, push, x, v, gain, mean)
+        _substep(gains, law, memory, inverse, momentum, rest, push, sensed, x, v, gain, mean)
     ctrl = vector(world.ctrl, world.first_ctrl + n)
     for i in range(n):
         ctrl[world.first_ctrl + i] = mean[i] / law.substeps
@@ -262,6 +270,7 @@ def _substep(
     momentum: Array,
     rest: Array,
     push: Array,
+    sensed: Array,
     x: Array,
     v: Array,
     gain: Array,
@@ -277,6 +286,7 @@ def _substep(
         momentum: M v / h_s (n,) [N m], changed.
         rest: Other forces on the links (n,) [N m].
         push: Of `_push_motors` (n,) [N m].
+        sensed: Torques of the gears as they were last sensed (n,) [N m].
         x: Positions of the links (n,) [rad], changed.
         v: Velocities of the links (n,) [rad/s], changed.
         gain: What the links' velocities gain in the substep (n,) [rad/s], filled.
@@ -303,7 +313,7 @@ def _substep(
         account.given += hs * torque * link
         mean[i] += torque - damping[i] * link
         momentum[i] += rest[i] + torque - damping[i] * link
-        known[i] += law.observes * (motor[i] - torque - beta * (w - omega[i]) - known[i])
+        known[i] += law.observes * (motor[i] - sensed[i] - beta * (w - omega[i]) - known[i])
         theta[i] += hs * speed
         x[i] += hs * link
         gain[i] = after[i] - v[i]
@@ -311,10 +321,9 @@ def _substep(
 
 
 @compiled
-def _close_loop(gains: Array, law: Law, memory: Array, x: Array, v: Array) -> None:
+def _close_loop(gains: Array, law: Law, memory: Array, ring: Array, x: Array, v: Array) -> None:
     """The torque loop: what it senses, and the motors' torques that follow after their lag."""
-    n, tail = x.size, ACCOUNT_SIZE + _ROWS * x.size
-    ring = memory[tail : tail + 2 * MOST_DELAY * n]
+    n = x.size
     K, D = _row(gains, LAW_SIZE, STIFFNESS, n), _row(gains, LAW_SIZE, GEAR, n)
     loop, bias, wave = (
         _row(gains, LAW_SIZE, LOOP, n),
@@ -369,7 +378,7 @@ def end_step(gains: Array, world: World, memory: Array, out: Array) -> int:
         at = first + i
         qpos[world.first_qpos + i] += moved[i]
         others[i] = smooth[at] - passive[at] + bias[at] - actuator[at] + constraint[at]
-    of_shaft = memory[ACCOUNT_SIZE + (_ROWS + 2 * MOST_DELAY) * n + nv * nv :]
+    of_shaft = memory[ACCOUNT_SIZE + _ROWS * n + nv * nv :]
     for i in range(law.bends):
         at = first + n + i
         of_shaft[i] = smooth[at] - passive[at] + bias[at] + constraint[at]
@@ -378,7 +387,10 @@ def end_step(gains: Array, world: World, memory: Array, out: Array) -> int:
 
 @compiled
 def feel(gains: Array, world: World, memory: Array, out: Array) -> int:
-    """What is measured: the torques of the gears, and the joints on the side where the encoders sit."""
+    """What is measured: the gears' torques, and the joints by encoders on the links or on the motors.
+
+    Those on the motors are reported as arms do, q_m = theta - tau_m / K with the measured torque.
+    """
     law, n = gains[:LAW_SIZE].view(LAW)[0], world.q.size
     K, D = _row(gains, LAW_SIZE, STIFFNESS, n), _row(gains, LAW_SIZE, GEAR, n)
     bias, wave = _row(gains, LAW_SIZE, BIAS, n), _row(gains, LAW_SIZE, WAVE, n)
@@ -387,7 +399,7 @@ def feel(gains: Array, world: World, memory: Array, out: Array) -> int:
         torque = K[i] * (theta[i] - world.q[i]) + D[i] * (omega[i] - world.v[i])
         world.tau_m[i] = torque + bias[i] + wave[i] * math.sin(law.waves * theta[i])
         if law.at_motor:
-            world.q_m[i], world.v_m[i] = theta[i], omega[i]
+            world.q_m[i], world.v_m[i] = theta[i] - world.tau_m[i] / K[i], omega[i]
     return GOES_ON
 
 
@@ -456,7 +468,7 @@ class JointDrives(PlantPart):
             *(scalar(f"drive_{name}", "j") for name in ("work", "loss", "stored", "given")),
         )
         drive, h = c.values(n), scene.model.opt.timestep
-        drawn = np.random.Generator(np.random.PCG64(self._rng.integers(2**63)))
+        drawn = copied(self._rng)
         spread = 1.0 + c.friction_spread * drawn.uniform(-1.0, 1.0, n)
         signs = drawn.choice([-1.0, 1.0], n)
         coulomb = c.each("coulomb_nm", n)
@@ -479,7 +491,7 @@ class JointDrives(PlantPart):
         law.substeps = max(1, math.ceil(h / LOOP_S - 1e-9))
         period = h / law.substeps
         law.h, law.ratio = h, c.inertia_shaping
-        law.delay = min(MOST_DELAY - 1, round(c.loop_delay_s / period))
+        law.delay = round(c.loop_delay_s / period)
         law.keep = math.exp(-2.0 * math.pi * c.loop_cutoff_hz * period)
         law.observes = -math.expm1(-2.0 * math.pi * c.friction_observer_hz * period)
         law.stribeck, law.waves = c.stribeck_velocity_rad_per_s, float(c.ripple_per_turn)
@@ -489,8 +501,8 @@ class JointDrives(PlantPart):
         cutoff = c.command_cutoff_hz
         law.command_keep = 0.0 if cutoff is None else math.exp(-2.0 * math.pi * cutoff * dt_s)
         law.bends = bend_joints(scene)
-        rows_size = (_ROWS + 2 * MOST_DELAY) * n
-        self.memory = np.zeros(ACCOUNT_SIZE + rows_size + scene.model.nv**2 + law.bends)
+        ring = 2 * (int(law.delay) + 1) * n
+        self.memory = np.zeros(ACCOUNT_SIZE + _ROWS * n + scene.model.nv**2 + law.bends + ring)
 
     def start(self, scene: Scene, data: mujoco.MjData, rng: np.random.Generator, dt_s: float) -> None:
         """The arm is at rest, held by its drives."""
@@ -507,6 +519,6 @@ class JointDrives(PlantPart):
         drive = self._c.values(n)
         rows[THETA] = data.qpos[scene.qpos_ids] + held / drive.stiffness
         rows[MOTOR] = rows[COMMAND] = held
-        ring = self.memory[ACCOUNT_SIZE + _ROWS * n :][: 2 * MOST_DELAY * n].reshape(MOST_DELAY, 2, n)
-        ring[:, 0] = held
+        sensed = 2 * (int(law.delay) + 1) * n
+        self.memory[-sensed:].reshape(-1, 2, n)[:, 0] = held
         laid_over(Account, self.memory).stored_at_start = 0.5 * float(np.sum(held * held / drive.stiffness))

@@ -245,7 +245,10 @@ class Simulation:
                 plant.hooks.record,
             )
             if self._run.progress.reason == PLANT_TOLD:
-                self._end(PLANT_TOLD)
+                self._run.progress.reason = GOING
+                if self._end(PLANT_TOLD).outcome is Outcome.TORQUE_RATE_LIMIT:  # told once; the stop goes on
+                    left -= done
+                    continue
             if done < ticks:
                 return
             left -= ticks

@@ -17,6 +17,8 @@ from surgsim.tick.nominal import dynamics, kinematics
 from surgsim.tick.scratch import scratch
 
 _LEAST_TORQUE_NM = 1.0
+DRIVE_SHARE = 0.06
+"""Most that w may be of the lowest frequency of the drives: the stop knows nothing of their gears."""
 
 
 class Stop(Record):
@@ -62,7 +64,8 @@ def new_stop(config: StopConfig, arm: ArmModel) -> Stop:
     """A stop that has not begun; `arm` must outlive it."""
     limits = arm.limits
     stop = new(Stop, limits.q_min.size)
-    stop.stiffness, stop.share = config.stiffness_per_s2, config.torque_share
+    softest = (DRIVE_SHARE * arm.locked_frequency) ** 2
+    stop.stiffness, stop.share = min(config.stiffness_per_s2, softest), config.torque_share
     stop.q_min[:], stop.q_max[:], stop.tau_max[:] = limits.q_min, limits.q_max, limits.torque
     arm.point(stop.nominal)
     return stop

@@ -1,10 +1,11 @@
 """Physiological tremor: seeded narrow-band noise."""
 
 import math
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import NonNegativeFloat, PositiveFloat
+from pydantic import Field, NonNegativeFloat, PositiveFloat
 
 from surgsim.catalog import PartConfig
 from surgsim.compiled import compiled
@@ -21,7 +22,7 @@ class TremorConfig(PartConfig):
 
     rms_m: NonNegativeFloat = 7e-5
     centre_hz: PositiveFloat = 10.0
-    width_hz: PositiveFloat = 2.0
+    width_hz: Annotated[float, Field(ge=0.01)] = 2.0
 
 
 def resonance(config: TremorConfig, period_s: float) -> tuple[float, float, float]:

@@ -269,10 +269,12 @@ def test_the_interface_clips_and_smooths():
     from surgsim.plant.drive import COMMAND
 
     acting = rows[COMMAND * N : COMMAND * N + N]
+    arm.plant.step(np.zeros(N), np.zeros(N))  # where it begins
     arm.plant.step(np.full(N, 5.0), np.zeros(N))
     assert acting == pytest.approx(0.1)
     smooth = Alone(drives(torque_rate_nm_per_s=None, command_cutoff_hz=50.0, **BARE))
     acting = smooth.memory[ACCOUNT_SIZE + COMMAND * N : ACCOUNT_SIZE + COMMAND * N + N]
+    smooth.plant.step(np.zeros(N), np.zeros(N))
     for k in range(1, 6):
         smooth.plant.step(np.full(N, 1.0), np.zeros(N))
         assert acting == pytest.approx(1.0 - np.exp(-2.0 * np.pi * 50.0 * 1e-3 * k))
@@ -282,14 +284,108 @@ def test_encoders_sit_where_they_are_said_to():
     for side in ("link", "motor"):
         arm = Alone(drives(encoder=side, **BARE), heavy=True)
         measured = arm.plant.state()
-        wanted = POSE if side == "link" else arm.motors
-        assert measured.q == pytest.approx(wanted, abs=1e-15)
-        assert measured.tau == pytest.approx(arm.column("joint_torque"))
-    assert np.abs(arm.motors - POSE).max() > 1e-3
+        assert measured.q == pytest.approx(POSE, abs=1e-12)  # the gears' deflection is known from the torques
+        assert np.abs(arm.motors - POSE).max() > 1e-3
+        for _ in range(30):
+            arm.plant.step(np.full(N, 5.0), np.zeros(N))
+        truth, measured = arm.plant.truth(), arm.plant.state()
+        speed = truth.v if side == "link" else arm.column("motor_speed")
+        assert measured.v == pytest.approx(speed, abs=1e-12)
+    assert np.abs(truth.v - arm.column("motor_speed")).max() > 1e-3
+
+
+def test_a_biased_torque_sensor_is_seen_and_acts_on_the_loop():
+    """A loop with B/B_s = 4 takes a bias b for a torque in the gear, which moves by -(1 - B_s/B) b."""
+    plain = Alone(drives(sensor_bias_nm=0.0, coulomb_nm=0.0), heavy=True)
+    held = plain.plant.state().tau.copy()
+    biased = Alone(drives(sensor_bias_nm=0.4, coulomb_nm=0.0), heavy=True)
+    first = biased.plant.state().tau - held
+    assert np.abs(first) == pytest.approx(0.4)
+    biased.scene.model.body_inertia[:] *= 1e6
+    biased.scene.model.body_mass[:] *= 1e6
+    biased.scene.model.opt.gravity[:] = 0.0
+    biased.plant.reset(POSE)
+    for _ in range(200):
+        biased.plant.step(np.zeros(N), np.zeros(N))
+    moved = biased.column("joint_torque")
+    assert moved[: N - 1] == pytest.approx(-0.75 * first[: N - 1], abs=0.02)
+
+
+@pytest.mark.parametrize(
+    ("keys", "lost"),
+    [
+        ({"coulomb_nm": 1.0, "static_nm": 3.0, "stribeck_velocity_rad_per_s": 0.2}, "stribeck"),
+        ({"coulomb_nm": 0.0, "viscous_nm_s_per_rad": 5.0}, "viscous"),
+    ],
+    ids=["stribeck", "viscous"],
+)
+def test_friction_takes_what_its_law_says(keys, lost):
+    """Loss = the integral of the friction's law over the motor's way, from the recorded speeds."""
+    arm = Alone(drives(**{**BARE, **keys}))
+    push, energy, loss = np.zeros(N), 0.0, []
+    push[0] = 8.0
+    for _ in range(300):
+        arm.plant.step(push, np.zeros(N))
+        w = arm.column("motor_speed")
+        law = {
+            "stribeck": 1.0 * np.abs(w) + 2.0 * np.exp(-((w / 0.2) ** 2)) * np.abs(w),
+            "viscous": 5.0 * w * w,
+        }[lost]
+        energy += 1e-3 * law.sum()
+        loss.append(arm.column("drive_loss_j")[0])
+    assert loss[-1] > 0.02
+    assert energy == pytest.approx(loss[-1], rel=0.03)
+
+
+def test_ripple_is_a_wave_over_the_motor_s_turn():
+    """A motor that is turned slowly is pushed back and forth by A sin(m theta), and the gear shows it."""
+    arm = Alone(drives(**{**BARE, "ripple_nm": 1.5, "ripple_per_turn": 3000}))
+    arm.scene.model.body_inertia[:] *= 1e6
+    arm.scene.model.body_mass[:] *= 1e6
+    arm.plant.reset(POSE)
+    expected, seen = [], []
+    for k in range(400):
+        arm.plant.step(np.full(N, 20.0 * (1.0 - np.cos(0.005 * k))), np.zeros(N))
+        push = 20.0 * (1.0 - np.cos(0.005 * k))
+        expected.append(push - 1.5 * np.sin(3000.0 * arm.motors[0]))
+        seen.append(arm.column("joint_torque")[0])
+    assert np.abs(np.array(seen) - expected).mean() < 0.2
+    assert np.abs(np.array(seen) - [20.0 * (1.0 - np.cos(0.005 * k)) for k in range(400)]).mean() > 0.5
+
+
+def test_a_friction_observer_in_the_torque_loop_gives_friction_back():
+    """Behind it a constant push turns the motor as if the friction were not there."""
+    ways = []
+    for coulomb, observer in ((2.0, 0.0), (2.0, 100.0), (0.0, 0.0)):
+        arm = Alone(drives(**{**BARE, "coulomb_nm": coulomb, "friction_observer_hz": observer}))
+        push = np.zeros(N)
+        push[0] = 4.0
+        for _ in range(200):
+            arm.plant.step(push, np.zeros(N))
+        ways.append(arm.motors[0] - POSE[0])
+    assert ways[0] < 0.6 * ways[2]
+    assert ways[1] == pytest.approx(ways[2], rel=0.1)
+
+
+def test_the_torque_loop_s_delay_is_as_long_as_it_says():
+    """Of a loop that divides by four, the first answer to a torque in the gear comes that much later."""
+    seen = {}
+    for delay in (0.0, 0.001, 0.002):
+        arm = Alone(drives(loop_cutoff_hz=1e5, loop_delay_s=delay, loop_damping_ratio=0.0, coulomb_nm=0.0))
+        arm.motors[0] += 1e-4  # 1 N m in the gear, all at once
+        torques = []
+        for _ in range(6):
+            arm.plant.step(np.zeros(N), np.zeros(N))
+            torques.append(arm.column("motor_speed")[0])
+        seen[delay] = np.array(torques)
+    early, middle, late = seen[0.0], seen[0.001], seen[0.002]
+    assert middle[0] == pytest.approx(late[0], rel=1e-9)  # neither has answered in the first millisecond
+    assert abs(early[0]) > 2.0 * abs(middle[0])
+    assert abs(middle[1]) > 1.2 * abs(late[1])
 
 
 def test_it_starts_at_rest():
-    """Held by its own friction and the weight's torques the arm stays where it is."""
+    """Held by the torques that its weight needs the arm stays where it is."""
     arm = Alone(drives(coulomb_nm=0.0), heavy=True)
     held = arm.plant.state().tau
     for _ in range(50):

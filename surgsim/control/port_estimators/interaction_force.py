@@ -90,12 +90,14 @@ def interaction_force(gains: Array, seen: Seen, memory: Array, out: Array) -> in
 
     d is the disturbance torque that `observe_positions` infers, f its lateral force at the port in the
     dynamically consistent sense, F the same in the world, with what payload and friction do at the start
-    taken off. With
-    a wall of stiffness K and a shaft that follows the estimate, o' = -G K (o - true offset): a first-order
-    lag of 1 / (G K), whatever K is. The harmonics are an internal model: they leave no force at their
-    frequencies. What o leaves of a wave leads it by 0 degrees (soft wall) to 90 (stiff wall); the advance of
-    45 keeps the learning within 45 of the right phase for every K, at the rate k w G_h / (2 G) cos 45 if
-    G K > k w. Along the shaft nothing is learnt: there the wall cannot be strained.
+    taken off. On real drives M holds their motors, though the torques are measured behind them: at the
+    accelerations of a breath they are worth 0.05 N m, and no light wrist amplifies the noise.
+
+    With a wall of stiffness K and a shaft that follows the estimate, o' = -G K (o - true offset): a
+    first-order lag of 1 / (G K), whatever K is. The harmonics are an internal model: they leave no force at
+    their frequencies. What o leaves of a wave leads it by 0 degrees (soft wall) to 90 (stiff wall); the
+    advance of 45 keeps the learning within 45 of the right phase for every K, at the rate
+    k w G_h / (2 G) cos 45 if G K > k w. Along the shaft nothing is learnt: there the wall cannot be strained.
 
     Source: ours; admittance to zero force, and adaptive feed-forward cancellation (Bodson and Douglas 1997).
     """

@@ -9,7 +9,6 @@ from pydantic import PositiveFloat
 from surgsim.compiled import compiled
 from surgsim.control.elastic_observer import DELAY, ElasticObserverConfig, look_ahead, send
 from surgsim.control.torque_laws.base import KernelTorqueLaw
-from surgsim.control.torque_laws.rcm_elastic_dynamics import locked_frequency
 from surgsim.models.arm import ArmModel
 from surgsim.tick.algebra import times
 from surgsim.tick.arrays import Seen
@@ -42,7 +41,7 @@ class JointElasticDynamicsConfig(ElasticObserverConfig):
     def build(self, arm: ArmModel) -> KernelTorqueLaw:
         """The law; its memory is the observer's."""
         numbers = self.numbers(arm)
-        w = min(self.bandwidth_share * locked_frequency(arm), self.most_bandwidth_rad_per_s)
+        w = min(self.bandwidth_share * arm.locked_frequency, self.most_bandwidth_rad_per_s)
         return KernelTorqueLaw(
             kernel=joint_elastic_dynamics,
             arm=arm,
@@ -56,7 +55,7 @@ class JointElasticDynamicsConfig(ElasticObserverConfig):
 def joint_elastic_dynamics(gains: Array, seen: Seen, memory: Array, out: Array) -> int:
     """U = (M + B_s) q'' + c + D_l v - d + f, at the state predicted for when the torque will act.
 
-        q'''' = w^2 (q_ref - q) + 2 zeta w (q_ref' - v)
+        q'' = w^2 (q_ref - q) + 2 zeta w (q_ref' - v)
 
     of the joint reference carried on to that instant. What the observer knows, and how the command is kept
     within the arm's limits, is as in `rcm_elastic_dynamics`.

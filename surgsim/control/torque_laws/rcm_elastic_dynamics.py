@@ -1,6 +1,5 @@
 """RCM inverse dynamics on elastic drives: RCM over tip over posture, links and motors observed apart."""
 
-import math
 from typing import Literal
 
 import numpy as np
@@ -41,7 +40,7 @@ class RcmElasticDynamicsConfig(ElasticObserverConfig):
     def build(self, arm: ArmModel) -> KernelTorqueLaw:
         """The law; its memory is the observer's."""
         numbers = self.numbers(arm)
-        rcm = min(self.bandwidth_share * locked_frequency(arm), self.most_bandwidth_rad_per_s)
+        rcm = min(self.bandwidth_share * arm.locked_frequency, self.most_bandwidth_rad_per_s)
         tip, joint, ratio = self.tip_bandwidth_ratio * rcm, self.joint_bandwidth_rad_per_s, self.damping_ratio
         pairs = [(w * w, 2.0 * zeta * w) for w, zeta in ((rcm, ratio), (tip, ratio), (joint, 1.0))]
         return KernelTorqueLaw(
@@ -52,13 +51,6 @@ class RcmElasticDynamicsConfig(ElasticObserverConfig):
             memory_size=self.memory_size(arm.limits.torque.size),
             failures={INFEASIBLE: "no joint acceleration keeps all limits"},
         )
-
-
-def locked_frequency(arm: ArmModel) -> float:
-    """The lowest sqrt(K / B_s) of an arm's drives [rad/s], a motor on its gear; infinite if ideal."""
-    if arm.drive is None:
-        return math.inf
-    return float(np.sqrt(arm.drive.stiffness / arm.drive.apparent_inertia).min())
 
 
 @compiled

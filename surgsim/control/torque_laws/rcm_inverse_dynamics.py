@@ -27,8 +27,8 @@ from surgsim.tick.status import GOES_ON, INFEASIBLE, RANK_LOST
 
 Array = NDArray[np.float64]
 
-OBSERVER, MOST_DELAY, FULL_GAIN = range(HIERARCHY_GAINS, HIERARCHY_GAINS + 3)
-"""Places of the gains that are this law's own."""
+OBSERVER, MOST_DELAY, FULL_GAIN, MOTORS = range(HIERARCHY_GAINS, HIERARCHY_GAINS + 4)
+"""Places of the gains that are this law's own; from MOTORS on the inertias of real drives' motors (n,)."""
 
 
 class RcmInverseDynamicsConfig(PartConfig):
@@ -87,6 +87,7 @@ class RcmInverseDynamicsConfig(PartConfig):
                     self.observer_gain,
                     self.most_delay_ticks,
                     self.full_gain_delay_s,
+                    *(np.zeros(n) if arm.drive is None else arm.drive.apparent_inertia),
                 ],
                 dtype=np.float64,
             ),
@@ -143,7 +144,11 @@ def rcm_inverse_dynamics(gains: Array, seen: Seen, memory: Array, out: Array) ->
     offset = torque_offset(delayed, most, n)
     for i in range(n):
         tau[i] = seen.tau[i] - (offset[i] - touch[i])
-    learnt = observe(known, first, seen.M, seen.bias, seen.damping, seen.v, tau, share * gains[OBSERVER], dt)
+    links = scratch_matrix(n, n)
+    links[:] = seen.M
+    for i in range(n):  # what is measured on real drives acts behind their motors
+        links[i, i] -= gains[MOTORS + i]
+    learnt = observe(known, first, links, seen.bias, seen.damping, seen.v, tau, share * gains[OBSERVER], dt)
     for i in range(n):
         d[i] = learnt[i] + touch[i]
     model = seen.elsewhere

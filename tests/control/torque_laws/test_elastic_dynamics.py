@@ -10,7 +10,7 @@ import surgsim
 from surgsim.contract.problems import torque_problem
 from surgsim.control.elastic_observer import DRY, ROWS, ElasticObserverConfig
 from surgsim.control.torque_laws.joint_elastic_dynamics import JointElasticDynamicsConfig
-from surgsim.control.torque_laws.rcm_elastic_dynamics import RcmElasticDynamicsConfig, locked_frequency
+from surgsim.control.torque_laws.rcm_elastic_dynamics import RcmElasticDynamicsConfig
 from surgsim.control.torque_laws.rcm_inverse_dynamics import RcmInverseDynamicsConfig
 from surgsim.errors import Outcome
 from surgsim.models.arm import ArmModel
@@ -33,7 +33,7 @@ def test_at_rest_it_asks_for_the_accelerations_of_the_rigid_law(on_drives, seed)
     still = np.zeros_like(problem.q)
     problem = replace(problem, v=still, dyn=on_drives.dynamics(problem.q, still))
     elastic = RcmElasticDynamicsConfig(
-        bandwidth_share=40.0 / locked_frequency(on_drives),
+        bandwidth_share=40.0 / on_drives.locked_frequency,
         tip_bandwidth_ratio=0.5,
         damping_ratio=0.9,
         delay_ticks=0,
@@ -55,14 +55,14 @@ def test_at_rest_it_asks_for_the_accelerations_of_the_rigid_law(on_drives, seed)
 
 
 def test_the_bandwidth_follows_the_drives_up_to_its_bound(on_drives):
-    free = locked_frequency(on_drives)
+    free = on_drives.locked_frequency
     drive = on_drives.drive
     assert free == pytest.approx(min(np.sqrt(drive.stiffness / drive.apparent_inertia)))
     for share, most, wanted in ((0.1, 1000.0, 0.1 * free), (10.0, 60.0, 60.0)):
         law = RcmElasticDynamicsConfig(bandwidth_share=share, most_bandwidth_rad_per_s=most).build(on_drives)
         assert law.gains[0] == pytest.approx(wanted**2)
     ideal = ArmModel(SceneConfig(robot=RobotConfig(name="panda")))
-    assert locked_frequency(ideal) == math.inf
+    assert ideal.locked_frequency == math.inf
     assert RcmElasticDynamicsConfig().build(ideal).gains[0] == pytest.approx(85.0**2)
 
 
