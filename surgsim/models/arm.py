@@ -125,6 +125,7 @@ class ArmModel:
             data.site_xmat[site].ctypes.data,
         )
         record.xaxis, record.xanchor = data.xaxis.ctypes.data, data.xanchor.ctypes.data
+        record.xpos, record.xmat, record.nbody = data.xpos.ctypes.data, data.xmat.ctypes.data, model.nbody
         record.damping[:] = self.damping
         return data
 
