@@ -80,7 +80,7 @@ small = ["theatre=false", "task.radius_m=0.002"]
 for controller in ("vprnn", "rcm_inverse_dynamics", "policy_proportional", "mink"):
     trace = simulate(load_scenario("circle_lwr4plus", controller=controller, assignments=[*short, *small]))
     print(controller, trace.block("q").tobytes().hex(), trace.block("tau").tobytes().hex())
-off = "disturbances=[{type: calibration_error}, {type: instrument_tracker, delay_s: 0.003, field_m: 1e-4}]"
+off = "disturbances=[{type: calibration_error}, {type: instrument_tracker, delay_s: 0.003, field_m: 1.0e-4}]"
 tracked = [*short, *small, off, "controller.instrument={type: tracked, ramp_s: 0.05}"]
 trace = simulate(load_scenario("circle_lwr4plus", controller="rcm_inverse_dynamics", assignments=tracked))
 print(trace.block("q").tobytes().hex(), trace.block("tip_believed").tobytes().hex())
