@@ -67,6 +67,9 @@ SHORTER = {
     "--out runs/robustness": "--controllers vprnn",
     "surgsim compare circle_lwr4plus --controllers rcm_inverse_dynamics,joint_impedance,vprnn --seeds 0:5 "
     "--set 'disturbances=[{type: calibration_error}]' --out runs/calibration": f"{SHORT} --seeds 0:1",
+    "surgsim compare calibrated_circle_lwr4plus calibrated_circle_panda --seeds 0:10 --out runs/tracked": (
+        f"{SHORT} --seeds 0:1"
+    ),
     "surgsim compare frontier --seeds 0:1 --out runs/frontier": "--controllers joint_impedance",
     "surgsim compare torque_level --out runs/torque_level": "--controllers rcm_inverse_dynamics",
     "surgsim adopt desk_arm.xml --flange tool "

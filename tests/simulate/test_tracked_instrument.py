@@ -76,6 +76,14 @@ def test_a_late_tracker_costs_nothing_where_the_arm_is_slow():
     np.testing.assert_allclose(late, prompt, rtol=0.5)
 
 
+def test_a_library_with_a_model_of_its_own_is_corrected_too():
+    """mink solves what pinv does, and would pull towards the nominal tip with the correction over a tick."""
+    mink, pinv = (run({"controller": name, "drive": "ideal"}, 0, duration_s=6.0) for name in ("mink", "pinv"))
+    for name in ("tip", "tip_believed"):
+        np.testing.assert_allclose(mink.block(name), pinv.block(name), rtol=0.0, atol=2e-5)
+    assert errors_mm(mink, 3.0)[0] < 0.2
+
+
 def test_without_a_tracker_the_estimator_changes_no_bit(scenario):
     disturbances = "disturbances=[{type: calibration_error}, {type: sensor_noise}]"
     nominal, tracked = (

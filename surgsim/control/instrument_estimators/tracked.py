@@ -3,7 +3,6 @@
 import math
 from typing import Annotated, Literal
 
-import mujoco
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, NonNegativeFloat, PositiveFloat
@@ -122,7 +121,7 @@ class TrackedInstrumentConfig(PartConfig):
         numbers = np.zeros(TRACKED_SIZE)
         record = laid_over(Tracked, numbers)
         take(record, self)
-        record.shaft_m = shaft_length(arm)
+        record.shaft_m = arm.shaft_length_m
         m = parameters(n)
         return KernelInstrumentEstimator(
             kernel=tracked_instrument,
@@ -144,14 +143,6 @@ class TrackedInstrumentConfig(PartConfig):
             *six(self.tool_position_m, self.tool_angle_rad),
         ]
         return np.square(deviations)
-
-
-def shaft_length(arm: ArmModel) -> float:
-    """Distance of the shaft's entry from the tip [m], the same in every posture."""
-    model, scene = arm.scene.model, arm.scene
-    data = mujoco.MjData(model)
-    mujoco.mj_kinematics(model, data)
-    return float(np.linalg.norm(data.site_xpos[scene.tip_site] - data.site_xpos[scene.shaft_entry_site]))
 
 
 def bodies(arm: ArmModel) -> Array:

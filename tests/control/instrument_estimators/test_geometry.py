@@ -8,7 +8,7 @@ import pytest
 from scipy.linalg import block_diag, logm
 
 from surgsim.control.instrument_estimators.geometry import fill_columns, parameters
-from surgsim.control.instrument_estimators.tracked import bodies, shaft_length
+from surgsim.control.instrument_estimators.tracked import bodies
 from surgsim.control.seen import new_seen
 from surgsim.models.arm import ArmModel
 from surgsim.models.build import build
@@ -54,10 +54,10 @@ def pose(scene, q, back):
 
 
 def columns(arm, q, back):
-    seen, n = new_seen(arm, dt_s=0.001, has_trocar=False), q.size
+    seen, n, shaft_m = new_seen(arm, dt_s=0.001, has_trocar=False), q.size, arm.shaft_length_m
     place(seen.elsewhere, q)
     H = np.full((6, parameters(n)), np.nan)
-    fill_columns(seen.elsewhere, bodies(arm), shaft_length(arm), back, H)
+    fill_columns(seen.elsewhere, bodies(arm), shaft_m, back, H)
     return H
 
 
