@@ -1,8 +1,11 @@
 """What a tracked instrument is worth: the true errors of runs with a calibration error."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from surgsim.control.decision import forget
 from surgsim.errors import Outcome
 from surgsim.scenario.load import load_scenario
 from surgsim.simulate.loop import Simulation, simulate
@@ -101,3 +104,46 @@ def test_a_second_run_begins_without_what_the_first_one_learnt(scenario, control
     setup = prepare(scenario(disturbances, f"controller.instrument={TRACKED}", controller=controller))
     first, again = Simulation(setup).run(), Simulation(setup).run()
     assert first.equals(again)
+
+
+class InPython:
+    """An instrument estimator that is a Python object, and does what a kernel does."""
+
+    def __init__(self, kernel):
+        self.inner = kernel
+
+    def start(self, problem):
+        return self.inner.start(problem)
+
+    def step(self, problem, memory):
+        return self.inner.step(problem, memory)
+
+
+SEEN = ("disturbances=[{type: calibration_error}, {type: instrument_tracker, delay_s: 0.005}]",)
+SEEN += (f"controller.instrument={TRACKED}",)
+
+
+@pytest.mark.parametrize("controller", ["joint_impedance", "rcm_inverse_dynamics"])
+def test_an_estimator_in_python_gives_the_run_of_the_kernel(scenario, controller):
+    made = scenario(*SEEN, controller=controller)
+    setup = prepare(made)
+    parts = setup.controller.parts
+    parts = replace(parts, instrument=InPython(parts.instrument))
+    trace = Simulation(replace(setup, controller=setup.controller.with_parts(parts))).run()
+    assert trace.equals(simulate(made))
+    assert np.ptp(trace["tip_believed_x_m"] - trace["tip_x_m"]) > 1e-5
+
+
+def test_what_was_learnt_outlives_a_tick_without_an_answer(scenario):
+    setup = prepare(scenario(*SEEN, controller="rcm_inverse_dynamics"))
+    simulation, control = Simulation(setup), setup.controller.control
+    for _ in range(250):
+        simulation.tick()
+    before = control.correction.copy()
+    forget(control)  # as the loop does where there is none
+    simulation.tick()
+    assert np.abs(before).max() > 1e-4
+    np.testing.assert_allclose(control.correction, before, rtol=0.05, atol=1e-6)
+    setup.controller.reset()
+    assert not control.correction.any()
+    assert not control.measured.corrected
