@@ -12,6 +12,7 @@ GROUPS = (
     "surgsim.resolvers",
     "surgsim.torque_laws",
     "surgsim.port_estimators",
+    "surgsim.instrument_estimators",
     "surgsim.tasks",
     "surgsim.disturbances",
     "surgsim.props",

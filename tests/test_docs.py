@@ -16,6 +16,7 @@ from pydantic_core import PydanticUndefined
 from surgsim.catalog import PartConfig
 from surgsim.cli.main import build_parser
 from surgsim.control.controller import ControllerConfig
+from surgsim.control.instrument_estimators import INSTRUMENT_ESTIMATORS
 from surgsim.control.port_estimators import PORT_ESTIMATORS
 from surgsim.control.resolvers import RESOLVERS
 from surgsim.control.torque_laws import TORQUE_LAWS
@@ -160,7 +161,8 @@ def sections():
         "recording": RecordingConfig,
         "controller": ControllerConfig,
     }
-    for catalog in (TASKS, PLANTS, DISTURBANCES, PROPS, RESOLVERS, TORQUE_LAWS, PORT_ESTIMATORS):
+    estimators = (PORT_ESTIMATORS, INSTRUMENT_ESTIMATORS)
+    for catalog in (TASKS, PLANTS, DISTURBANCES, PROPS, RESOLVERS, TORQUE_LAWS, *estimators):
         for name in catalog.names():
             config = catalog.config(name)
             if config.__module__.startswith("surgsim."):

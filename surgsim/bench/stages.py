@@ -25,8 +25,8 @@ STAGES = ("model", "port", "resolver", "law", "task", "mj_step", "plant", "safet
 
 Nominal model, port estimator, resolver, torque law, the task's command, MuJoCo, what else the plant does,
 safety limits, the two readings of the clock where they are taken, entering the loop once a chunk, and the
-rest: kinematics of the remote centre, velocity bounds, the trace's row. As what is left of the tick, it
-carries the others' errors.
+rest: correction by an instrument estimator, kinematics of the remote centre, velocity bounds, the trace's
+row. As what is left of the tick, it carries the others' errors.
 """
 
 

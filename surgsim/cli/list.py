@@ -19,6 +19,7 @@ KINDS = (
     "resolvers",
     "torque-laws",
     "port-estimators",
+    "instrument-estimators",
     "policies",
     "plants",
     "disturbances",
@@ -72,6 +73,7 @@ def items_of(kind: str) -> list[tuple[str, str]]:
         from surgsim.metrics.catalog import METRICS
 
         return [(metric.name, metric.meaning) for metric in METRICS.values()]
+    from surgsim.control.instrument_estimators import INSTRUMENT_ESTIMATORS
     from surgsim.control.port_estimators import PORT_ESTIMATORS
     from surgsim.control.resolvers import RESOLVERS
     from surgsim.control.torque_laws import TORQUE_LAWS
@@ -85,6 +87,7 @@ def items_of(kind: str) -> list[tuple[str, str]]:
         "resolvers": RESOLVERS,
         "torque-laws": TORQUE_LAWS,
         "port-estimators": PORT_ESTIMATORS,
+        "instrument-estimators": INSTRUMENT_ESTIMATORS,
         "plants": PLANTS,
         "disturbances": DISTURBANCES,
         "props": PROPS,

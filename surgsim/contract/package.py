@@ -6,6 +6,7 @@ from typing import Any
 from surgsim.catalog import Catalog
 from surgsim.contract import (
     configs,
+    instrument_estimators,
     metrics,
     plant_parts,
     policies,
@@ -16,6 +17,7 @@ from surgsim.contract import (
     torque_laws,
 )
 from surgsim.contract.check import BrokenPromiseError, Check, Result
+from surgsim.control.instrument_estimators import INSTRUMENT_ESTIMATORS
 from surgsim.control.policies.registry import GROUP as POLICIES
 from surgsim.control.policies.registry import find_policy
 from surgsim.control.port_estimators import PORT_ESTIMATORS
@@ -33,11 +35,21 @@ from surgsim.plant.props import PROPS
 from surgsim.plugins import GROUPS, Offer, all_offers, misplaced
 from surgsim.tasks import TASKS
 
-CATALOGS = (RESOLVERS, TORQUE_LAWS, PORT_ESTIMATORS, TASKS, DISTURBANCES, PROPS, PLANTS)
+CATALOGS = (
+    RESOLVERS,
+    TORQUE_LAWS,
+    PORT_ESTIMATORS,
+    INSTRUMENT_ESTIMATORS,
+    TASKS,
+    DISTURBANCES,
+    PROPS,
+    PLANTS,
+)
 CHECKS: dict[str, tuple[Check, ...]] = {
     RESOLVERS.kind: resolvers.CHECKS,
     TORQUE_LAWS.kind: torque_laws.CHECKS,
     PORT_ESTIMATORS.kind: port_estimators.CHECKS,
+    INSTRUMENT_ESTIMATORS.kind: instrument_estimators.CHECKS,
     TASKS.kind: tasks.CHECKS,
     DISTURBANCES.kind: plant_parts.DISTURBANCE_CHECKS,
     PROPS.kind: plant_parts.PROP_CHECKS,

@@ -8,8 +8,13 @@ from numpy.typing import NDArray
 
 from surgsim.columns import Block
 from surgsim.compiled import address_of
-from surgsim.control.decision import ESTIMATOR, LAW, SOLVER
+from surgsim.control.decision import ESTIMATOR, INSTRUMENT, LAW, SOLVER
 from surgsim.control.failure import ControlFailure, failure_of
+from surgsim.control.instrument_estimators.base import (
+    Correction,
+    InstrumentEstimator,
+    instrument_problem_of,
+)
 from surgsim.control.joining import Call, Desk, Joined, join, join_resolver, memory_size
 from surgsim.control.port_estimators.base import PortEstimate, PortEstimator, port_problem_of
 from surgsim.control.problem import Resolution
@@ -29,6 +34,8 @@ Array = NDArray[np.float64]
 class PartArrays(NamedTuple):
     """The arrays that `surgsim.tick.arrays.Minds` says the places of, by the same names."""
 
+    instrument_gains: Array
+    instrument_memory: Array
     port_gains: Array
     port_memory: Array
     resolver_gains: Array
@@ -43,11 +50,13 @@ class ControllerParts:
     """A controller's parts as their configs build them: kernels with their numbers, or Python objects.
 
     Attributes:
+        instrument: Instrument estimator.
         port: Port estimator.
         resolver: Resolver.
         law: Torque law; None on the kinematic plant.
     """
 
+    instrument: InstrumentEstimator[Any]
     port: PortEstimator[Any]
     resolver: Resolver[Any]
     law: TorqueLaw[Any] | None
@@ -64,11 +73,19 @@ class ControllerParts:
 
 
 def new_control(
-    arm: ArmModel, *, dt_s: float, has_trocar: bool, has_law: bool, omega_gain: float, at_reference: bool
+    arm: ArmModel,
+    *,
+    dt_s: float,
+    has_trocar: bool,
+    has_law: bool,
+    corrects: bool,
+    omega_gain: float,
+    at_reference: bool,
 ) -> Control:
     """The record of a controller's tick; `arm` must outlive it."""
     c = new(Control, arm.limits.q_min.size)
-    c.has_law, c.at_reference, c.command.budget_j = has_law, at_reference, np.inf
+    c.has_law, c.at_reference, c.corrects = has_law, at_reference, corrects
+    c.command.budget_j = np.inf
     for seen in (c.seen, c.referred):
         fill_constants(seen, arm, dt_s=dt_s, has_trocar=has_trocar, omega_gain=omega_gain)
     arm.point(c.measured)
@@ -103,6 +120,15 @@ class Bound:
     def addressed(self) -> tuple[int, ...]:
         """The parts whose numbers hold addresses, by the value of `Control.who`."""
         return tuple(who for who, part in self.joined.items() if part.entered or part.below)
+
+    def forget_instrument(self) -> None:
+        """Nothing is known of the instrument but the nominal model."""
+        c = self.control
+        self.arrays.instrument_memory[:] = 0.0
+        self.remembered.pop("instrument", None)
+        c.correction[:] = 0.0
+        for model in (c.measured, c.reference, c.seen.elsewhere, c.referred.elsewhere):
+            model.corrected = 0
 
     def failure(self, status: int) -> ControlFailure:
         """Why the last tick has no answer.
@@ -139,9 +165,12 @@ def bind(parts: ControllerParts, control: Control, arm: ArmModel) -> Bound:
         memory = np.zeros(memory_size(part))
         return Desk(seen=seen, out=out, memory=memory, limits=arm.limits, remembered=remembered)
 
+    at_instrument = desk(parts.instrument, c.seen, c.correction)
     at_port = desk(parts.port, c.seen, c.port)
     at_resolver = desk(parts.resolver, c.referred if c.at_reference else c.seen, c.resolved)
     at_law, signature = desk(parts.law, c.seen, terms), law_signature(n)
+    call = _instrument_call(parts.instrument, at_instrument)
+    instrument = join(parts.instrument, at_instrument, signature, call, "instrument")
     call = _port_call(parts.port, at_port, has_dynamics=bool(c.has_law))
     port = join(parts.port, at_port, signature, call, "port")
     resolver = join_resolver(parts.resolver, at_resolver, "resolver")
@@ -149,6 +178,8 @@ def bind(parts: ControllerParts, control: Control, arm: ArmModel) -> Bound:
     if parts.law is not None:
         law = join(parts.law, at_law, signature, _law_call(parts.law, at_law, c.resolved), "law")
     minds = PartArrays(
+        instrument_gains=instrument.gains,
+        instrument_memory=at_instrument.memory,
         port_gains=port.gains,
         port_memory=at_port.memory,
         resolver_gains=resolver.gains,
@@ -159,9 +190,25 @@ def bind(parts: ControllerParts, control: Control, arm: ArmModel) -> Bound:
     )
     for name, array in minds._asdict().items():
         point(c.minds[name], array)
-    c.minds.port, c.minds.resolver, c.minds.law = port.kernel, resolver.kernel, law.kernel
-    joined = {ESTIMATOR: port, SOLVER: resolver, LAW: law}
+    c.minds.instrument, c.minds.port = instrument.kernel, port.kernel
+    c.minds.resolver, c.minds.law = resolver.kernel, law.kernel
+    joined = {ESTIMATOR: port, SOLVER: resolver, LAW: law, INSTRUMENT: instrument}
     return Bound(parts=parts, control=control, arrays=minds, joined=joined, remembered=remembered)
+
+
+def _instrument_call(instrument: Any, desk: Desk) -> Call:
+    """A tick of an instrument estimator that is a Python object."""
+    seen, out, remembered = fields_of(desk.seen), desk.out, desk.remembered
+
+    def call() -> None:
+        problem = instrument_problem_of(seen)
+        if "instrument" not in remembered:
+            remembered["instrument"] = instrument.start(problem)
+        correction: Correction
+        correction, remembered["instrument"] = instrument.step(problem, remembered["instrument"])
+        out[0], out[1] = correction.linear, correction.angular
+
+    return call
 
 
 def _port_call(port: Any, desk: Desk, *, has_dynamics: bool) -> Call:

@@ -14,6 +14,9 @@ from surgsim.compiled import as_parameter
 from surgsim.control.binding import ControllerParts, bind, new_control
 from surgsim.control.decision import decide, decide_signature, forget
 from surgsim.control.failure import ControlFailure
+from surgsim.control.instrument_estimators import INSTRUMENT_ESTIMATORS
+from surgsim.control.instrument_estimators.base import InstrumentEstimatorConfig, fill_tracked
+from surgsim.control.instrument_estimators.nominal import NominalInstrumentConfig
 from surgsim.control.joining import has_state_in_python
 from surgsim.control.port_estimators import PORT_ESTIMATORS
 from surgsim.control.port_estimators.base import PortEstimatorConfig
@@ -36,9 +39,11 @@ if TYPE_CHECKING:  # what a controller may use of a part, whichever it is
     AnyResolver = ResolverConfig
     AnyTorqueLaw = TorqueLawConfig
     AnyPortEstimator = PortEstimatorConfig
+    AnyInstrumentEstimator = InstrumentEstimatorConfig
 else:
     AnyResolver, AnyTorqueLaw = RESOLVERS.union(), TORQUE_LAWS.union()
     AnyPortEstimator = PORT_ESTIMATORS.union()
+    AnyInstrumentEstimator = INSTRUMENT_ESTIMATORS.union()
 
 
 class ControllerConfig(PartConfig):
@@ -49,6 +54,7 @@ class ControllerConfig(PartConfig):
         resolver: Velocity-level redundancy resolver.
         torque_law: Torque-level law; null is for the kinematic plant, which does not use one.
         port: Where the controller believes the trocar to be.
+        instrument: Where it believes the instrument to be, given the joint positions.
         evaluate_at: Where the resolver's kinematics are evaluated: the `measured` joint positions, or the
             integrated `reference`, as a position-controlled arm would.
         position_gain_per_s: alpha of the bounds Omega: how fast a joint may approach its position limit.
@@ -59,12 +65,13 @@ class ControllerConfig(PartConfig):
     resolver: AnyResolver
     torque_law: AnyTorqueLaw | None = None
     port: AnyPortEstimator = MeasuredPortConfig()
+    instrument: AnyInstrumentEstimator = NominalInstrumentConfig()
     evaluate_at: Literal["measured", "reference"] = "measured"
     position_gain_per_s: PositiveFloat = 10.0
 
     def check(self, scenario: Surroundings) -> None:
         """Refuse a scenario that one of the parts does not fit."""
-        for part in (self.resolver, self.torque_law, self.port):
+        for part in (self.resolver, self.torque_law, self.port, self.instrument):
             if part is not None:
                 part.check(scenario)
 
@@ -89,7 +96,7 @@ class ControlOutput:
 
 
 class Controller:
-    """Port estimator, resolver and torque law on a plant's measured states, one tick at a time.
+    """Estimators, resolver and torque law on a plant's measured states, one tick at a time.
 
     The tick itself is the kernel `surgsim.control.decision.decide`; this builds its arrays and calls it.
 
@@ -105,7 +112,7 @@ class Controller:
 
     Attributes:
         control: The record that `decide` works on.
-        parts: Port estimator, resolver and torque law as their configs build them.
+        parts: Estimators, resolver and torque law as their configs build them.
         estimates: Whether the trocar's place is estimated rather than taken as seen.
     """
 
@@ -118,6 +125,7 @@ class Controller:
             check_redundancy(part, arm, has_trocar)
         self._join(
             ControllerParts(
+                instrument=config.instrument.build(arm),
                 port=config.port.build(arm),
                 resolver=config.resolver.build(arm),
                 law=config.torque_law.build(arm) if use_torque_law and config.torque_law else None,
@@ -134,6 +142,7 @@ class Controller:
             dt_s=self._dt,
             has_trocar=has_trocar,
             has_law=self.parts.law is not None,
+            corrects=getattr(self.parts.instrument, "corrects", True),
             omega_gain=config.position_gain_per_s,
             at_reference=config.evaluate_at == "reference",
         )
@@ -161,15 +170,16 @@ class Controller:
     @property
     def objects(self) -> dict[str, object]:
         """What of the controller is a Python object with a state, by name."""
-        port, resolver, law = self.parts.port, self.parts.resolver, self.parts.law
-        parts: dict[str, object] = {"port": port, "resolver": resolver, "torque_law": law}
+        p = self.parts
+        parts = {"instrument": p.instrument, "port": p.port, "resolver": p.resolver, "torque_law": p.law}
         named = {f"controller.{name}": part for name, part in parts.items() if has_state_in_python(part)}
         return {**named, "controller's memory": self._bound.remembered}
 
     @property
     def arrays(self) -> dict[str, Array]:
         """The parts' numbers and memories, without addresses."""
-        held = {("port_gains", "resolver_gains", "law_gains")[who] for who in self._bound.addressed}
+        names = ("port_gains", "resolver_gains", "law_gains", "instrument_gains")
+        held = {names[who] for who in self._bound.addressed}
         return {name: a for name, a in self._bound.arrays._asdict().items() if name not in held}
 
     @property
@@ -180,6 +190,7 @@ class Controller:
     def reset(self) -> None:
         """Forget everything: the next tick is the first."""
         forget(self.control)
+        self._bound.forget_instrument()
 
     def tick(self, state: State, command: TipCommand) -> ControlOutput:
         """Command for the plant's `state`.
@@ -191,6 +202,7 @@ class Controller:
         seen.t_s, seen.q[:], seen.v[:] = state.t_s, state.q, state.v
         seen.tau[:], seen.f_T[:] = state.tau, state.f_T
         seen.p_WC[:], seen.v_WC[:], seen.a_WC[:] = state.p_WC, state.v_WC, 0.0
+        fill_tracked(seen, state.tracked)
         fill_command(self.control.command, command)
         status = self._decide(self.control)
         if status != GOES_ON:

@@ -1,4 +1,4 @@
-"""A controller's tick as a kernel: nominal model, port estimate, resolver, torque law, joint reference.
+"""A controller's tick as a kernel: correction and nominal model, port, resolver, torque law, joint reference.
 
 What a controller's parts see is written here alone.
 """
@@ -13,10 +13,12 @@ from surgsim.control.bounds import fill_velocity_bounds
 from surgsim.control.rcm import fill_rcm
 from surgsim.tick.arrays import Control, Seen, World, type_of
 from surgsim.tick.nominal import copy_model, dynamics, kinematics
+from surgsim.tick.rigid import exponential
+from surgsim.tick.scratch import scratch, scratch_matrix
 from surgsim.tick.status import GOES_ON
 from surgsim.tick.views import doubles, numbers
 
-ESTIMATOR, SOLVER, LAW = range(3)
+ESTIMATOR, SOLVER, LAW, INSTRUMENT = range(4)
 """Values of `Control.who`."""
 
 
@@ -35,11 +37,16 @@ def measure(seen: Seen, world: World) -> None:
     for i in range(3):
         seen.f_T[i], seen.p_WC[i] = world.f_T_m[i], world.p_WC_m[i]
         seen.v_WC[i], seen.a_WC[i] = world.v_WC_m[i], 0.0
+    seen.tracked_samples = world.tracked_samples
+    if world.tracked_samples > 0:
+        seen.tracked_age_s = world.tracked_age_s
+        seen.p_WT_m[:] = world.p_WT_m
+        seen.R_WT_m[:] = world.R_WT_m
 
 
 @compiled
 def forget(c: Control) -> None:
-    """The next tick is the first."""
+    """The next tick is the first; what is known of the instrument stays."""
     c.seen.first = 1
 
 
@@ -48,6 +55,10 @@ def decide(c: Control) -> int:
     """Fill the answers in `c` from the measured state and the command in it."""
     seen, minds = c.seen, c.minds
     _refer(c)
+    if c.corrects:
+        status: int = _correct(c)
+        if status != GOES_ON:
+            return status
     kinematics(c.measured, seen.q)
     if c.has_law:
         dynamics(c.measured, seen.v)
@@ -55,7 +66,7 @@ def decide(c: Control) -> int:
     copy_model(c.measured, seen)
     c.who = ESTIMATOR
     port = doubles(c.port.ctypes.data, 3, 3)
-    status: int = call_at(minds.port, numbers(minds.port_gains), seen, numbers(minds.port_memory), port)
+    status = call_at(minds.port, numbers(minds.port_gains), seen, numbers(minds.port_memory), port)
     if status != GOES_ON:
         return status
     _see_port(c)
@@ -86,6 +97,24 @@ def decide(c: Control) -> int:
                 c.torque[j] += terms[i, j]
     seen.first = 0
     return GOES_ON
+
+
+@compiled
+def _correct(c: Control) -> int:
+    """Ask the instrument estimator, and correct every nominal model that a part may evaluate."""
+    minds, p, R = c.minds, scratch(3), scratch_matrix(3, 3)
+    c.who = INSTRUMENT
+    twist = doubles(c.correction.ctypes.data, 2, 3)
+    status: int = call_at(
+        minds.instrument, numbers(minds.instrument_gains), c.seen, numbers(minds.instrument_memory), twist
+    )
+    if status == GOES_ON:
+        exponential(twist[0], twist[1], p, R)
+        for model in (c.measured, c.reference, c.seen.elsewhere, c.referred.elsewhere):
+            model.corrected = 1
+            model.p_NT[:] = p
+            model.R_NT[:] = R
+    return status
 
 
 @compiled
@@ -140,6 +169,9 @@ def _referred(c: Control) -> Seen:
     other.t_s, other.first, other.budget_j = seen.t_s, seen.first, seen.budget_j
     other.roll_rate, other.jaw = seen.roll_rate, seen.jaw
     other.tau[:] = seen.tau
+    other.tracked_samples, other.tracked_age_s = seen.tracked_samples, seen.tracked_age_s
+    other.p_WT_m[:] = seen.p_WT_m
+    other.R_WT_m[:] = seen.R_WT_m
     other.q_ref[:] = seen.q_ref
     other.qdot_ref[:] = seen.qdot_ref
     for i in range(3):

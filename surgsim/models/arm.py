@@ -109,6 +109,12 @@ class ArmModel:
         turned = cross(kin.z_W[-1], kin.R_WT[:, 2])
         return bool(np.abs(turned).max() < _ALONG and np.abs(kin.Jv_WT[:, -1]).max() < _ALONG)
 
+    @cached_property
+    def shaft_length_m(self) -> float:
+        """Distance of the shaft's entry from the tip [m], the same in every posture."""
+        self._place(self.limits.q_min)
+        return float(np.linalg.norm(self._tip - self._data.site_xpos[self._scene.shaft_entry_site]))
+
     def redundancy(self, has_trocar: bool) -> int:
         """Degrees of freedom that are left when the tip, and with a trocar the shaft, are held.
 
@@ -133,6 +139,7 @@ class ArmModel:
             data.site_xmat[site].ctypes.data,
         )
         record.xaxis, record.xanchor = data.xaxis.ctypes.data, data.xanchor.ctypes.data
+        record.xpos, record.xmat, record.nbody = data.xpos.ctypes.data, data.xmat.ctypes.data, model.nbody
         record.damping[:] = self.damping
         return data
 

@@ -124,6 +124,7 @@ def see_arm(world: World) -> None:
         world.p_WT[i], world.p_WR[i] = tip[i], wrist[i]
         world.p_WC[i] = math.nan if world.trocar < 0 else site_place(world, world.trocar)[i]
         world.p_WC_m[i], world.v_WC_m[i] = world.p_WC[i], 0.0
+    world.tracked_samples = 0
 
 
 @compiled

@@ -8,6 +8,28 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 NO_FORCE = np.zeros(3)
 NO_FORCE.flags.writeable = False
+NO_PLACE, NO_TURN = np.full(3, np.nan), np.full((3, 3), np.nan)
+NO_PLACE.flags.writeable = NO_TURN.flags.writeable = False
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TrackedPose:
+    """The last pose of the instrument that a tracker measured, world frame.
+
+    Attributes:
+        samples: Poses measured so far; 0: there is none.
+        age_s: How much older it is than the joint positions of the same state [s].
+        p_WT: Tip position (3,) [m]; NaN without one.
+        R_WT: Tip orientation (3, 3).
+    """
+
+    samples: int = 0
+    age_s: float = 0.0
+    p_WT: Array = field(default_factory=lambda: NO_PLACE)
+    R_WT: Array = field(default_factory=lambda: NO_TURN)
+
+
+NOT_TRACKED = TrackedPose()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -22,6 +44,7 @@ class State:
         p_WC: Trocar position, world frame (3,) [m]; NaN without a trocar.
         v_WC: Trocar velocity as announced to the controller (3,) [m/s]; zeros where nobody announces it.
         f_T: Force of the surroundings on the tip, as a sensor at the tip measures it, world frame (3,) [N].
+        tracked: What a tracker says of the instrument.
     """
 
     t_s: float
@@ -31,3 +54,4 @@ class State:
     p_WC: Array
     v_WC: Array
     f_T: Array = field(default_factory=lambda: NO_FORCE)
+    tracked: TrackedPose = NOT_TRACKED

@@ -17,7 +17,7 @@ from surgsim.errors import SurgsimError
 from surgsim.models.build import Scene
 from surgsim.plant.bore import Bore
 from surgsim.plant.part import PlantPart
-from surgsim.plant.state import State
+from surgsim.plant.state import NOT_TRACKED, State, TrackedPose
 from surgsim.tick.arrays import Numbers, Record, World, hook_signature, new, point, type_of
 from surgsim.tick.python_part import PythonPart, first_raised, python_kernel
 from surgsim.tick.status import GOES_ON
@@ -76,7 +76,17 @@ def measured(world: World) -> State:
         p_WC=world.p_WC_m.copy(),
         v_WC=world.v_WC_m.copy(),
         f_T=world.f_T_m.copy(),
+        tracked=_tracked(world),
     )
+
+
+def _tracked(world: World) -> TrackedPose:
+    """A copy of the tracker's last sample."""
+    samples = int(world.tracked_samples)
+    if samples == 0:
+        return NOT_TRACKED
+    age_s = float(world.tracked_age_s)
+    return TrackedPose(samples=samples, age_s=age_s, p_WT=world.p_WT_m.copy(), R_WT=world.R_WT_m.copy())
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -229,6 +239,9 @@ def hook_call(
         state = part.sense(measured(world))
         world.q_m[:], world.v_m[:], world.tau_m[:] = state.q, state.v, state.tau
         world.p_WC_m[:], world.v_WC_m[:], world.f_T_m[:] = state.p_WC, state.v_WC, state.f_T
+        pose = state.tracked
+        world.tracked_samples, world.tracked_age_s = pose.samples, pose.age_s
+        world.p_WT_m[:], world.R_WT_m[:] = pose.p_WT, pose.R_WT
 
     def record() -> None:
         values()[:] = part.values()

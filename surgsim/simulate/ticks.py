@@ -13,7 +13,7 @@ from numba import types
 from numpy.typing import NDArray
 
 from surgsim.compiled import call_at, compiled
-from surgsim.control.decision import ESTIMATOR, decide, forget, measure
+from surgsim.control.decision import ESTIMATOR, INSTRUMENT, decide, forget, measure
 from surgsim.plant.bore import Bore
 from surgsim.plant.contacts import Watch
 from surgsim.plant.world import Hooks
@@ -186,10 +186,12 @@ def _record_torque(row: Array, at: RowPlaces, limit: Array, torque: Array) -> No
 
 @compiled
 def _record_belief(row: Array, at: RowPlaces, c: Control) -> None:
-    """Where the controller takes tip and shaft to be: its nominal model at the measured joint positions.
+    """Where the controller takes tip and shaft to be: its model at the measured joint positions.
 
     `c.seen` is that also where a resolver is evaluated at the joint reference.
     """
+    if c.who == INSTRUMENT:
+        return
     _put(row, at.tip_believed, c.seen.p_WT)
     if c.seen.has_trocar and c.who != ESTIMATOR:
         row[at.rcm_error_believed] = norm(c.seen.rcm_error)

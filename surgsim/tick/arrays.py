@@ -136,7 +136,13 @@ class Model(Record):
         site_xmat: Of the tip's orientation.
         xaxis: Of the joint axes.
         xanchor: Of the points on them.
+        xpos: Of the places of the bodies.
+        xmat: Of their orientations.
         site: The tip's site.
+        nbody: Bodies.
+        corrected: 1 where `p_NT` and `R_NT` count, else 0.
+        p_NT: Corrected tip in the nominal tip's frame (3,) [m].
+        R_NT: Its orientation there (3, 3).
         q: Joint positions of the evaluation (n,) [rad].
         v: Joint velocities of the evaluation (n,) [rad/s].
         p_WT: Tip position (3,) [m].
@@ -151,6 +157,8 @@ class Model(Record):
     """
 
     SHAPES: ClassVar[dict[str, str]] = {
+        "p_NT": "3",
+        "R_NT": "3 3",
         "q": "n",
         "v": "n",
         "p_WT": "3",
@@ -164,7 +172,7 @@ class Model(Record):
         "damping": "n",
     }
     ADDRESSES: ClassVar[frozenset[str]] = frozenset(
-        ("mj_model", "mj_data", "qpos", "qvel", "site_xpos", "site_xmat", "xaxis", "xanchor")
+        ("mj_model", "mj_data", "qpos", "qvel", "site_xpos", "site_xmat", "xaxis", "xanchor", "xpos", "xmat")
     )
     mj_model: int
     mj_data: int
@@ -174,7 +182,13 @@ class Model(Record):
     site_xmat: int
     xaxis: int
     xanchor: int
+    xpos: int
+    xmat: int
     site: int
+    nbody: int
+    corrected: int
+    p_NT: Array
+    R_NT: Array
     q: Array
     v: Array
     p_WT: Array
@@ -202,6 +216,10 @@ class Seen(Record):
         jaw: How far the jaws close, from 0 to 1.
         budget_j: Energy that may be given to the surroundings in this period [J]; infinite: no limit.
         omega_gain: alpha of Omega [1/s].
+        tracked_samples: Poses of the instrument that a tracker has measured so far; 0: there is none.
+        tracked_age_s: How much older than q the last of them is [s].
+        p_WT_m: Tip position in it (3,) [m].
+        R_WT_m: Tip orientation in it (3, 3).
         q: Joint positions at which the kinematics were evaluated (n,) [rad].
         v: Joint velocities there (n,) [rad/s].
         tau: Joint torques that were measured over the last period (n,) [N m].
@@ -241,6 +259,8 @@ class Seen(Record):
 
     SHAPES: ClassVar[dict[str, str]] = {
         **{name: shape for name, shape in Model.SHAPES.items()},
+        "p_WT_m": "3",
+        "R_WT_m": "3 3",
         "tau": "n",
         "f_T": "3",
         "p_WC": "3",
@@ -274,6 +294,10 @@ class Seen(Record):
     jaw: float
     budget_j: float
     omega_gain: float
+    tracked_samples: int
+    tracked_age_s: float
+    p_WT_m: Array
+    R_WT_m: Array
     q: Array
     v: Array
     tau: Array
@@ -401,9 +425,12 @@ class Minds(Record):
     """Kernels, numbers and memories of a controller's parts, and the terms of its torque.
 
     Attributes:
-        port: Address of the port estimator's kernel.
+        instrument: Address of the instrument estimator's kernel.
+        port: Of the port estimator's.
         resolver: Of the resolver's.
         law: Of the torque law's.
+        instrument_gains: Of the instrument estimator.
+        instrument_memory: Of the instrument estimator.
         port_gains: Of the port estimator.
         port_memory: Of the port estimator.
         resolver_gains: Of the resolver.
@@ -413,10 +440,13 @@ class Minds(Record):
         terms: Terms of the torque (k, n) [N m], row by row.
     """
 
-    ADDRESSES: ClassVar[frozenset[str]] = frozenset(("port", "resolver", "law"))
+    ADDRESSES: ClassVar[frozenset[str]] = frozenset(("instrument", "port", "resolver", "law"))
+    instrument: int
     port: int
     resolver: int
     law: int
+    instrument_gains: Numbers
+    instrument_memory: Numbers
     port_gains: Numbers
     port_memory: Numbers
     resolver_gains: Numbers
@@ -432,25 +462,35 @@ class Control(Record):
     Attributes:
         has_law: Whether there is a torque law, else 0.
         at_reference: Whether the resolver's kinematics are those of the joint reference.
+        corrects: Whether the instrument estimator may correct the nominal model.
         who: Written: the part that a status other than GOES_ON came from.
         q_ref: Joint reference at this tick (n,) [rad].
         torque: Sum of the law's terms (n,) [N m].
+        correction: Twist of the corrected tip in the nominal tip's frame, rows linear [m] and angular [rad]
+            (2, 3).
         port: Rows position, velocity and acceleration of the estimated port (3, 3).
         minds: Where the parts' kernels, numbers and memories are.
         command: The task's command.
-        seen: What the parts see, one after the other: port estimator, resolver, torque law.
+        seen: What the parts see, one after the other: instrument and port estimator, resolver, torque law.
         referred: What the resolver sees where it is evaluated at the joint reference.
         measured: The nominal model at the measured state.
         reference: The nominal model at the joint reference.
         resolved: The resolver's answer.
     """
 
-    SHAPES: ClassVar[dict[str, str]] = {"q_ref": "n", "torque": "n", "port": "3 3"}
+    SHAPES: ClassVar[dict[str, str]] = {
+        "q_ref": "n",
+        "torque": "n",
+        "correction": "2 3",
+        "port": "3 3",
+    }
     has_law: int
     at_reference: int
+    corrects: int
     who: int
     q_ref: Array
     torque: Array
+    correction: Array
     port: Array
     minds: Minds
     command: Command
@@ -510,6 +550,8 @@ class World(Record):
         dt_s: Control period [s].
         timestep_s: Physics step [s].
         jaw: How far the jaws are told to close.
+        tracked_samples: Poses of the instrument that a tracker has measured so far.
+        tracked_age_s: How much older than the measured joint positions the last of them is [s].
         tau_max: Torque limits (n,) [N m].
         torque: Torque on its way to the joints (n,) [N m].
         qdot: The resolver's velocities (n,) [rad/s].
@@ -530,12 +572,15 @@ class World(Record):
         p_WC_m: Trocar as the controller is told (3,) [m].
         v_WC_m: Trocar's velocity as announced (3,) [m/s].
         f_T_m: Measured force on the tip (3,) [N].
+        p_WT_m: Tip in the tracker's last sample; NaN without one (3,) [m].
+        R_WT_m: Tip orientation in it (3, 3).
     """
 
     SHAPES: ClassVar[dict[str, str]] = {
         **{name: "n" for name in ("tau_max", "torque", "qdot", "q", "v", "tau", "q_m", "v_m", "tau_m")},
         **{name: "3" for name in ("p_WT", "p_WR", "p_WC", "f_C", "f_T", "p_WC_m", "v_WC_m", "f_T_m")},
-        **{name: "3" for name in ("port_home", "port_offset", "port_velocity")},
+        **{name: "3" for name in ("port_home", "port_offset", "port_velocity", "p_WT_m")},
+        "R_WT_m": "3 3",
     }
     ADDRESSES: ClassVar[frozenset[str]] = frozenset(
         (
@@ -603,6 +648,8 @@ class World(Record):
     dt_s: float
     timestep_s: float
     jaw: float
+    tracked_samples: int
+    tracked_age_s: float
     tau_max: Array
     torque: Array
     qdot: Array
@@ -623,6 +670,8 @@ class World(Record):
     p_WC_m: Array
     v_WC_m: Array
     f_T_m: Array
+    p_WT_m: Array
+    R_WT_m: Array
 
 
 @cache
@@ -635,7 +684,8 @@ def resolver_signature(n: int) -> Any:
 def law_signature(n: int) -> Any:
     """Status = torque(gains, seen, memory, out: terms of the torque as rows (k, n)).
 
-    Of a port estimator too: out has the rows position, velocity and acceleration (3, 3).
+    Of a port estimator too: out has the rows position, velocity and acceleration (3, 3). And of an instrument
+    estimator: the rows linear and angular (2, 3) of the correction's twist.
     """
     return types.int64(A1, type_of(Seen, n), A1, A2)
 

@@ -70,6 +70,9 @@ SHORTER = {
     "surgsim compare circle_lwr4plus --controllers rcm_inverse_dynamics,rcm_elastic_dynamics,joint_impedance "
     "--seeds 0:1 --set simulation.timestep_s=0.0005 --set 'disturbances=[{type: bending_shaft}]' "
     "--out runs/bending_shaft": SHORT,
+    "surgsim compare calibrated_circle_lwr4plus calibrated_circle_panda --seeds 0:10 --out runs/tracked": (
+        f"{SHORT} --seeds 0:1"
+    ),
     "surgsim compare frontier --seeds 0:1 --out runs/frontier": "--controllers joint_impedance",
     "surgsim compare torque_level --out runs/torque_level": "--controllers rcm_inverse_dynamics",
     "surgsim tune joint_impedance --scenario theatre_lwr4plus --budget 60 --out tuned": f"{SHORT} --budget 6",

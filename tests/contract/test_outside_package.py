@@ -14,6 +14,7 @@ from surgsim.plugins import GROUPS
 GOOD = '''
 """Parts that keep their promises."""
 from typing import Literal
+from surgsim.control.instrument_estimators.tracked import TrackedInstrumentConfig
 from surgsim.control.port_estimators.tracking import TrackingConfig
 from surgsim.control.resolvers.pinv import PinvConfig
 from surgsim.control.torque_laws.joint_impedance import JointImpedanceConfig
@@ -34,6 +35,10 @@ class Law(JointImpedanceConfig):
 class Estimator(TrackingConfig):
     """A port estimator of somebody else's."""
     type: Literal["my_estimator"] = "my_estimator"
+
+class Instrument(TrackedInstrumentConfig):
+    """An instrument estimator of somebody else's."""
+    type: Literal["my_instrument"] = "my_instrument"
 
 class Task(CircleConfig):
     """A task of somebody else's."""
@@ -102,6 +107,15 @@ class Estimator(PartConfig):
         zero = np.zeros(3)
         return SimpleNamespace(p_WC=problem.p_WC + 0.01, v_WC=zero, a_WC=zero), None
 
+class Instrument(PartConfig):
+    """Corrects without having seen anything."""
+    type: Literal["bad_instrument"] = "bad_instrument"
+    def build(self, arm): return self
+    def start(self, problem): return None
+    def step(self, problem, memory):
+        from types import SimpleNamespace
+        return SimpleNamespace(linear=np.full(3, 1e-4), angular=np.zeros(3)), None
+
 class Task(PartConfig):
     """Sends the tip to no number."""
     type: Literal["bad_task"] = "bad_task"
@@ -152,6 +166,7 @@ KINDS = {
     "resolvers": "Resolver",
     "torque_laws": "Law",
     "port_estimators": "Estimator",
+    "instrument_estimators": "Instrument",
     "tasks": "Task",
     "disturbances": "Disturbance",
     "props": "Prop",
@@ -209,6 +224,7 @@ def test_good_parts_of_every_kind_keep_every_promise(surgsim, tmp_path):
         "resolver",
         "torque law",
         "port estimator",
+        "instrument estimator",
         "task",
         "disturbance",
         "prop",
@@ -224,6 +240,7 @@ BROKEN = {
     "bad_resolver": ("answers are finite, inside the bounds", "rad/s beyond the bounds"),
     "bad_law": ("a finite row for every term", "the same problem gives other torques again"),
     "bad_estimator": ("starts where the trocar is seen", "the first estimate is 0.01 m from where"),
+    "bad_instrument": ("corrects nothing without a tracker", "a correction of 0.0001 without a tracked"),
     "bad_task": ("commands are finite", "a command is not finite"),
     "bad_disturbance": (
         "leaves the arm as the controller knows it",

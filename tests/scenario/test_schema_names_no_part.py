@@ -3,6 +3,7 @@
 import ast
 import inspect
 
+from surgsim.control.instrument_estimators import INSTRUMENT_ESTIMATORS
 from surgsim.control.port_estimators import PORT_ESTIMATORS
 from surgsim.control.resolvers import RESOLVERS
 from surgsim.control.torque_laws import TORQUE_LAWS
@@ -12,7 +13,16 @@ from surgsim.plant.props import PROPS
 from surgsim.scenario import schema
 from surgsim.tasks import TASKS
 
-CATALOGS = (TASKS, PLANTS, DISTURBANCES, PROPS, RESOLVERS, TORQUE_LAWS, PORT_ESTIMATORS)
+CATALOGS = (
+    TASKS,
+    PLANTS,
+    DISTURBANCES,
+    PROPS,
+    RESOLVERS,
+    TORQUE_LAWS,
+    PORT_ESTIMATORS,
+    INSTRUMENT_ESTIMATORS,
+)
 
 
 def named_in(source):

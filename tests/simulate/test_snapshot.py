@@ -54,6 +54,28 @@ def test_a_circle_goes_on_with_the_same_bits(controller, ticks):
     _same(_rest(simulation, 60), expected)
 
 
+TRACKED = (
+    "controller.instrument={type: tracked}",
+    "disturbances=[{type: calibration_error}, {type: instrument_tracker, delay_s: 0.02, dropout: 0.3}]",
+)
+
+
+@pytest.mark.parametrize(
+    ("controller", "drive"),
+    [("rcm_inverse_dynamics", "ideal"), ("mink", "ideal"), ("rcm_elastic_dynamics", "real")],
+)
+def test_a_tracked_instrument_goes_on_with_the_same_bits(controller, drive):
+    assignments = (*SHORT, *TRACKED, f"robot.drive={drive}")
+    simulation = _begun(load_scenario("circle_panda", controller=controller, assignments=assignments), 137)
+    taken = pickle.loads(pickle.dumps(simulation.snapshot()))
+    fork = simulation.fork()
+    expected = _rest(simulation, 60)
+    assert np.ptp(expected, axis=0).any()
+    _same(_rest(fork, 60), expected)
+    simulation.restore(taken)
+    _same(_rest(simulation, 60), expected)
+
+
 @pytest.mark.parametrize(
     ("name", "ticks"), [("theatre_panda", 200), ("peg_and_ring_panda", 150), ("teleop_wall_panda", 150)]
 )

@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from surgsim.control.instrument_estimators import INSTRUMENT_ESTIMATORS
 from surgsim.control.joining import is_compiled
 from surgsim.control.port_estimators import PORT_ESTIMATORS
 from surgsim.control.resolvers import RESOLVERS
@@ -16,6 +17,7 @@ from surgsim.control.torque_laws import TORQUE_LAWS
 from surgsim.simulate.loop import Simulation, simulate
 from surgsim.simulate.setup import prepare
 
+PARTS = ("instrument", "port", "resolver", "law")
 ANSWERS = """
 import sys
 import numpy as np
@@ -78,6 +80,10 @@ small = ["theatre=false", "task.radius_m=0.002"]
 for controller in ("vprnn", "rcm_inverse_dynamics", "policy_proportional", "mink"):
     trace = simulate(load_scenario("circle_lwr4plus", controller=controller, assignments=[*short, *small]))
     print(controller, trace.block("q").tobytes().hex(), trace.block("tau").tobytes().hex())
+off = "disturbances=[{type: calibration_error}, {type: instrument_tracker, delay_s: 0.003, field_m: 1.0e-4}]"
+tracked = [*short, *small, off, "controller.instrument={type: tracked, ramp_s: 0.05}"]
+trace = simulate(load_scenario("circle_lwr4plus", controller="rcm_inverse_dynamics", assignments=tracked))
+print(trace.block("q").tobytes().hex(), trace.block("tip_believed").tobytes().hex())
 """
 
 
@@ -104,7 +110,7 @@ def test_a_teleoperation_in_python_gives_the_bits_of_the_compiled_loop():
 
 def test_a_whole_run_in_python_gives_the_bits_of_the_compiled_loop():
     python, compiled = (_printed(RUN, compiled=compiled) for compiled in (False, True))
-    assert len(python) == 4
+    assert len(python) == 5
     assert python == compiled
 
 
@@ -120,7 +126,7 @@ def test_a_function_without_its_decorator_runs_in_the_loop_with_the_same_trace(s
     expected = simulate(made)
     setup = prepare(made)
     parts = setup.controller.parts
-    plain = type(parts)(**{name: _undecorated(getattr(parts, name)) for name in ("port", "resolver", "law")})
+    plain = type(parts)(**{name: _undecorated(getattr(parts, name)) for name in PARTS})
     trace = Simulation(replace(setup, controller=setup.controller.with_parts(plain))).run()
     assert trace.equals(expected)
 
@@ -141,7 +147,7 @@ def test_threads_do_not_disturb_each_other(scenario):
 
 def test_every_shipped_law_is_a_compiled_kernel_and_few_enter_python(arm):
     inside = set()
-    for catalog in (RESOLVERS, TORQUE_LAWS, PORT_ESTIMATORS):
+    for catalog in (RESOLVERS, TORQUE_LAWS, PORT_ESTIMATORS, INSTRUMENT_ESTIMATORS):
         for name in catalog.names():
             part = catalog.config(name)().build(arm)
             assert is_compiled(part), name

@@ -21,7 +21,7 @@ from surgsim.tick.overlay import laid_over, overlay
 from surgsim.tick.python_part import enter
 from surgsim.tick.scratch import scratch, scratch_matrix
 from surgsim.tick.status import GOES_ON, INFEASIBLE
-from surgsim.tick.views import vector
+from surgsim.tick.views import doubles, vector
 
 Array = NDArray[np.float64]
 
@@ -49,7 +49,7 @@ class MinkConfig(PartConfig):
         solver, gains = MinkSolver(self, arm), np.zeros(LAW_SIZE)
         law, n = laid_over(Law, gains), arm.limits.q_min.size
         law.k_tip, law.k_rcm = self.k_tip, self.k_rcm
-        law.mj_model, law.mj_data, law.qpos = solver.addresses
+        law.mj_model, law.mj_data, law.qpos, law.site_xpos, law.site_xmat = solver.addresses
         return KernelResolver(
             kernel=mink_velocity,
             arm=arm,
@@ -71,15 +71,19 @@ class Law(Record):
         mj_model: Address of the model of mink's configuration.
         mj_data: Of its data.
         qpos: Of the joint positions in them.
+        site_xpos: Of the tip's place in them.
+        site_xmat: Of its orientation.
     """
 
-    ADDRESSES: ClassVar[frozenset[str]] = frozenset(("mj_model", "mj_data", "qpos"))
+    ADDRESSES: ClassVar[frozenset[str]] = frozenset(("mj_model", "mj_data", "qpos", "site_xpos", "site_xmat"))
     head: Head
     k_tip: float
     k_rcm: float
     mj_model: int
     mj_data: int
     qpos: int
+    site_xpos: int
+    site_xmat: int
 
 
 LAW, LAW_SIZE = overlay(Law)
@@ -102,14 +106,17 @@ class MinkSolver:
         self._configuration = mink.Configuration(model)
         self._tip = mink.FrameTask("tip", "site", position_cost=config.tip_cost, orientation_cost=0.0)
         self._tip.set_target(mink.SE3.identity())
-        self._rcm = RcmTask(arm.scene.tip_site, model.nv)
+        self._site = arm.scene.tip_site
+        self._rcm = RcmTask(self._site, model.nv)
         self._speeds = dict(zip(joint_names(model), arm.limits.velocity.tolist(), strict=True))
 
     @property
-    def addresses(self) -> tuple[int, int, int]:
-        """Of the configuration's model, its data and the joint positions in them."""
-        data = self._configuration.data
-        return self._configuration.model._address, data._address, data.qpos.ctypes.data
+    def addresses(self) -> tuple[int, int, int, int, int]:
+        """Of the configuration's model, its data, and in them of joint positions, tip's place and turn."""
+        data, model = self._configuration.data, self._configuration.model
+        place, turn = data.site_xpos[self._site], data.site_xmat[self._site]
+        arrays = (data.qpos.ctypes.data, place.ctypes.data, turn.ctypes.data)
+        return model._address, data._address, *arrays
 
     def join(self, seen: Fields, memory: Array) -> Callable[[], int]:
         """What the kernel enters to have mink's answer to the target and the RCM's shift in its memory."""
@@ -159,7 +166,7 @@ def mink_velocity(gains: Array, seen: Seen, memory: Array, out: Resolved) -> int
         memory[_TARGET + i] = seen.p_WT[i] + seen.dt_s * v[i]
     for i in range(seen.rows):  # mink's row reads J dq = -N (p - target)
         memory[_SHIFT + i] = seen.rcm_error[i] + seen.dt_s * v[3 + i]
-    _place(law, seen.q)
+    _place(law, seen)
     status = enter(gains)
     if status != GOES_ON:
         return status
@@ -168,13 +175,21 @@ def mink_velocity(gains: Array, seen: Seen, memory: Array, out: Resolved) -> int
 
 
 @compiled
-def _place(law: Law, q: Array) -> None:
-    """What `mink.Configuration.update` does for tip and shaft, at `q` (n,) [rad]."""
-    qpos = vector(law.qpos, q.size)
-    for i in range(q.size):
-        qpos[i] = q[i]
+def _place(law: Law, seen: Seen) -> None:
+    """What `mink.Configuration.update` does for tip and shaft, which then go where they are believed to be.
+
+    MuJoCo takes Jacobians at the site's place, so that they follow.
+    """
+    qpos = vector(law.qpos, seen.q.size)
+    for i in range(seen.q.size):
+        qpos[i] = seen.q[i]
     mj_kinematics(law.mj_model, law.mj_data)
     mj_comPos(law.mj_model, law.mj_data)
+    tip, turn = vector(law.site_xpos, 3), doubles(law.site_xmat, 3, 3)
+    for i in range(3):
+        tip[i] = seen.p_WT[i]
+        for k in range(3):
+            turn[i, k] = seen.R_WT[i, k]
 
 
 def _examine(gains: Array, seen: Seen, memory: Array) -> Mapping[str, Array]:

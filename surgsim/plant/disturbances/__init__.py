@@ -13,6 +13,7 @@ DISTURBANCES = Catalog(
         "gravity_error": "surgsim.plant.disturbances.gravity_error:GravityErrorConfig",
         "guiding_hand": "surgsim.plant.disturbances.guiding_hand:GuidingHandConfig",
         "inertia_error": "surgsim.plant.disturbances.inertia_error:InertiaErrorConfig",
+        "instrument_tracker": "surgsim.plant.disturbances.instrument_tracker:InstrumentTrackerConfig",
         "joint_friction": "surgsim.plant.disturbances.joint_friction:JointFrictionConfig",
         "late_ticks": "surgsim.plant.disturbances.late_ticks:LateTicksConfig",
         "payload": "surgsim.plant.disturbances.payload:PayloadConfig",

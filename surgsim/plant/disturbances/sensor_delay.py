@@ -15,11 +15,13 @@ from surgsim.tick.arrays import World
 from surgsim.tick.status import GOES_ON
 
 Array = NDArray[np.float64]
+_OTHERS = 23
+"""Numbers of a row beside those of the joints: port, tip force, and the tracker's last sample."""
 
 
 @compiled
 def _write(world: World, row: Array) -> None:
-    """What is measured now, to a row (3 n + 9,)."""
+    """What is measured now, to a row (3 n + 23,)."""
     n = world.q_m.size
     for i in range(n):
         row[i], row[n + i], row[2 * n + i] = world.q_m[i], world.v_m[i], world.tau_m[i]
@@ -29,11 +31,15 @@ def _write(world: World, row: Array) -> None:
             world.v_WC_m[i],
             world.f_T_m[i],
         )
+        row[3 * n + 9 + i] = world.p_WT_m[i]
+        for k in range(3):
+            row[3 * n + 12 + 3 * i + k] = world.R_WT_m[i, k]
+    row[3 * n + 21], row[3 * n + 22] = world.tracked_samples, world.tracked_age_s
 
 
 @compiled
 def _read(world: World, row: Array) -> None:
-    """What was measured, from a row (3 n + 9,)."""
+    """What was measured, from a row (3 n + 23,)."""
     n = world.q_m.size
     for i in range(n):
         world.q_m[i], world.v_m[i], world.tau_m[i] = row[i], row[n + i], row[2 * n + i]
@@ -41,6 +47,10 @@ def _read(world: World, row: Array) -> None:
         world.p_WC_m[i] = row[3 * n + i]
         world.v_WC_m[i] = row[3 * n + 3 + i]
         world.f_T_m[i] = row[3 * n + 6 + i]
+        world.p_WT_m[i] = row[3 * n + 9 + i]
+        for k in range(3):
+            world.R_WT_m[i, k] = row[3 * n + 12 + 3 * i + k]
+    world.tracked_samples, world.tracked_age_s = int(row[3 * n + 21]), row[3 * n + 22]
 
 
 @compiled
@@ -49,7 +59,7 @@ def delay(gains: Array, world: World, memory: Array, out: Array) -> int:
 
     All of them are the first one at the start: the arm was at rest before.
     """
-    width = 3 * world.q_m.size + 9
+    width = 3 * world.q_m.size + _OTHERS
     count = memory.size // width
     if world.tick == 0:
         for k in range(count):
@@ -62,7 +72,7 @@ def delay(gains: Array, world: World, memory: Array, out: Array) -> int:
 
 
 class SensorDelayConfig(DisturbanceConfig):
-    """The whole measured state is old: joints, torques, port and tip force; the time is the present.
+    """The whole measured state is old: joints, torques, port, tip force, instrument; the time is the present.
 
     Attributes:
         delay_s: Its age, a whole multiple of the control period [s].
@@ -92,4 +102,4 @@ class SensorDelay(Disturbance):
     def attach(self, scene: Scene, dt_s: float) -> None:
         """Make room for the states."""
         ticks = round(self._c.delay_s / dt_s)
-        self.memory = np.zeros((ticks + 1) * (3 * len(scene.dof_ids) + 9))
+        self.memory = np.zeros((ticks + 1) * (3 * len(scene.dof_ids) + _OTHERS))
