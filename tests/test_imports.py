@@ -25,6 +25,7 @@ LAYERS = (
     "surgsim.tasks",
     "surgsim.plant.state",
     "surgsim.plant.truth",
+    "surgsim.plant.records",
     "surgsim.plant.shaft",
     "surgsim.plant.bore",
     "surgsim.plant.part",
