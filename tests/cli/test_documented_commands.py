@@ -60,7 +60,9 @@ SHORTER = {
     "surgsim compare circle_lwr4plus --controllers vprnn,policy_proportional": SHORT,
     "surgsim compare circle_lwr4plus --controllers vprnn,pinv --set task.radius_m=0.01 "
     "--out runs/small_circle": SHORT,
-    "surgsim compare theatre --out runs/theatre": f"{SHORT} --controllers vprnn --seeds 0:2",
+    "surgsim compare theatre --out runs/theatre": f"{SHORT} --controllers joint_elastic_dynamics --seeds 0:1",
+    "surgsim compare theatre_ideal --out runs/theatre_ideal": f"{SHORT} --controllers vprnn --seeds 0:2",
+    "surgsim compare drives --out runs/drives": "--controllers joint_elastic_dynamics --seeds 0:1",
     "surgsim compare breathing_tracked --out runs/breathing_tracked": f"{SHORT} --controllers vprnn",
     "surgsim compare breathing_hidden --out runs/breathing_hidden": f"{SHORT} --controllers vprnn",
     "surgsim compare robustness --seeds 0:1 --controllers vprnn,joint_impedance,rcm_inverse_dynamics "
@@ -73,7 +75,7 @@ SHORTER = {
     "surgsim compare calibrated_circle_lwr4plus calibrated_circle_panda --seeds 0:10 --out runs/tracked": (
         f"{SHORT} --seeds 0:1"
     ),
-    "surgsim compare frontier --seeds 0:1 --out runs/frontier": "--controllers joint_impedance",
+    "surgsim compare frontier --seeds 0:1 --out runs/frontier": "--controllers rcm_inverse_dynamics",
     "surgsim compare torque_level --out runs/torque_level": "--controllers rcm_inverse_dynamics",
     "surgsim tune joint_impedance --scenario theatre_lwr4plus --budget 60 --out tuned": f"{SHORT} --budget 6",
     "surgsim compare theatre_lwr4plus --controllers joint_impedance,tuned/joint_impedance_tuned.yaml "
@@ -90,6 +92,10 @@ SLOW = (
     "surgsim compare robustness ",
     "surgsim compare frontier ",
     "surgsim compare torque_level ",
+    "surgsim compare drives ",
+)
+RIGID = (
+    "surgsim run circle_panda --controller rcm_inverse_dynamics --set robot.drive=real --out runs/rigid_law"
 )
 NO_PREDICTION = (
     "surgsim run circle_lwr4plus --controller rcm_inverse_dynamics "
@@ -99,6 +105,7 @@ NO_PREDICTION = (
     "--set controller.torque_law.most_delay_ticks=0 --out runs/no_prediction"
 )
 STATUS = {
+    RIGID: 1,  # a law that takes the drives for ideal
     NO_PREDICTION: 1,  # past the frontier: the run is stopped, as the page says
     "surgsim compare seeds --out runs/seeds --shard 1/2": 1,  # the other shard is missing
 }
