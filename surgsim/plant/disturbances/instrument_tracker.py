@@ -19,12 +19,14 @@ from surgsim.tick.arrays import World
 from surgsim.tick.rigid import exponential
 from surgsim.tick.scratch import scratch, scratch_matrix
 from surgsim.tick.status import GOES_ON
-from surgsim.tick.views import site_turn
+from surgsim.tick.views import site_place, site_turn
 
 Array = NDArray[np.float64]
-POSITION_STD, ANGLE_STD, MARKERS, RATE, DELAY, LOST, DROPOUT, FIELD, FIELD_ANGLE, FIRST_WAVE = range(10)
+POSITION_STD, ANGLE_STD, MARKERS, RATE, DELAY, LOST, DROPOUT, FIELD, FIELD_ANGLE, STRAIGHT = range(10)
 """Gains: s_p [m], s_a [rad], L [m], rate [Hz], delay [ticks], when it is lost [s], the probability of a
-missed frame, amplitudes of the field [m] and [rad]; then its waves."""
+missed frame, amplitudes of the field [m] and [rad]; the straight instrument's tip in the frame of the shaft's
+entry, place (3,) [m] and orientation (3, 3); then the field's waves."""
+FIRST_WAVE = STRAIGHT + 12
 WAVES = 4
 """Waves of each of the field's six components: wave vector (3,) [rad/m] and phase [rad]."""
 FRAME, TAKEN, GIVEN, SLOTS = range(4)
@@ -42,8 +44,9 @@ def track(gains: Array, world: World, memory: Array, out: Array) -> int:
         p_M = p_WT - L d,   p_m = p_M + s_p n_p + f(p_M),   R_m = R_WT exp([s_a n_a + g(p_M)]x)
         p_WT,m = p_m + L d_m
 
-    with independent normal n, the shaft's axis d and the static field f, g. A sample holds until the next one
-    is given; its age says which joint positions it belongs to.
+    with independent normal n, the shaft's axis d and the static field f, g. Where the shaft bends, p_WT and d
+    are those of a straight one: markers at its upper end do not see that it is bent. A sample holds until the
+    next one is given; its age says which joint positions it belongs to.
     """
     now, ring = world.tick, memory[SLOTS + (BLOCK_TICKS + 1) * DRAWS :]
     slots = ring.size // SAMPLE
@@ -74,11 +77,11 @@ def track(gains: Array, world: World, memory: Array, out: Array) -> int:
 @compiled
 def _take(gains: Array, world: World, drawn: Array, sample: Array) -> None:
     """Measure the pose of now."""
-    true = site_turn(world, world.tip)
     markers, field, turn, rest = scratch(3), scratch(6), scratch(3), scratch(3)
-    R = scratch_matrix(3, 3)
+    true, R = scratch(9), scratch_matrix(3, 3)
+    _straight(gains, world, markers, true)
     for i in range(3):
-        markers[i] = world.p_WT[i] - gains[MARKERS] * true[3 * i + 2]
+        markers[i] -= gains[MARKERS] * true[3 * i + 2]
     _field(gains, markers, field)
     for i in range(3):
         turn[i] = gains[ANGLE_STD] * drawn[3 + i] + field[3 + i]
@@ -93,6 +96,20 @@ def _take(gains: Array, world: World, drawn: Array, sample: Array) -> None:
                 s += true[3 * i + j] * R[j, k]
             sample[4 + 3 * i + k] = s
         sample[1 + i] = markers[i] + gains[MARKERS] * sample[4 + 3 * i + 2]
+
+
+@compiled
+def _straight(gains: Array, world: World, tip: Array, turn: Array) -> None:
+    """Fill place (3,) [m] and orientation (9,) of the tip as a straight shaft has it."""
+    entry, axes = site_place(world, world.entry), site_turn(world, world.entry)
+    for i in range(3):
+        tip[i] = entry[i]
+        for k in range(3):
+            tip[i] += axes[3 * i + k] * gains[STRAIGHT + k]
+            s = 0.0
+            for j in range(3):
+                s += axes[3 * i + j] * gains[STRAIGHT + 3 + 3 * j + k]
+            turn[3 * i + k] = s
 
 
 @compiled
@@ -156,6 +173,15 @@ class InstrumentTrackerConfig(DisturbanceConfig):
         return InstrumentTracker(self, rng)
 
 
+def _straight_tip(scene: Scene) -> Array:
+    """Place [m] and orientation (12,) of the tip in the frame of the entry, with the shaft straight."""
+    model, entry, tip = scene.model, scene.shaft_entry_site, scene.tip_site
+    data = mujoco.MjData(model)  # at the positions that the model is made at
+    mujoco.mj_kinematics(model, data)
+    R_WE, R_WT = (data.site_xmat[site].reshape(3, 3) for site in (entry, tip))
+    return np.concatenate((R_WE.T @ (data.site_xpos[tip] - data.site_xpos[entry]), (R_WE.T @ R_WT).ravel()))
+
+
 class InstrumentTracker(Disturbance):
     """Noise, field, rate, delay and losses of a tracked instrument."""
 
@@ -184,7 +210,7 @@ class InstrumentTracker(Disturbance):
             c.field_m,
             c.field_angle_rad,
         )
-        self.gains = np.concatenate((own, self._waves.ravel()))
+        self.gains = np.concatenate((own, _straight_tip(scene), self._waves.ravel()))
         slots = math.ceil(c.delay_s * c.rate_hz) + 2
         self.memory = np.zeros(SLOTS + (BLOCK_TICKS + 1) * DRAWS + slots * SAMPLE)
 

@@ -26,7 +26,7 @@ def watch(scenario):
 
     def run(tracker, ticks=200, others=(CALIBRATION,), seed=1):
         parts = ", ".join([*others, f"{{type: instrument_tracker{tracker}}}"])
-        keys = (f"disturbances=[{parts}]", "task.duration_s=3")
+        keys = (f"disturbances=[{parts}]", "task.duration_s=3", "simulation.timestep_s=0.0005")
         setup = prepare(scenario(*keys, controller="rcm_inverse_dynamics", seed=seed))
         simulation, plant, site = Simulation(setup), setup.plant, setup.plant.world.tip
         seen, true = [], []
@@ -138,6 +138,14 @@ def test_the_field_is_static_and_of_the_place_of_the_markers(watch):
     assert np.abs(wanted).max() > 3e-4
     np.testing.assert_array_equal(seen[0].p_WT, again[0].p_WT)
     assert (gains[FIRST_WAVE:] != others[FIRST_WAVE:]).all()
+
+
+def test_markers_at_the_upper_end_do_not_see_the_shaft_bend(watch):
+    push = "{type: push, force_n: [0.0, 3.0, 0.0], start_s: 0.0, duration_s: 1.0}"
+    seen, true, _ = watch(f", {QUIET}, rate_hz: 1000", others=("{type: bending_shaft}", push))
+    off = np.array([pose.p_WT - p for pose, (p, _) in zip(seen, true, strict=True)])
+    assert np.linalg.norm(off[0]) < 1e-4
+    assert np.linalg.norm(off, axis=1).max() > 1e-3
 
 
 def test_without_a_tracker_nothing_is_tracked(scenario):
