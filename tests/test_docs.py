@@ -115,6 +115,7 @@ def test_yaml_examples_are_valid(text, tmp_path):
 @pytest.mark.parametrize("code", blocks("python"))
 def test_python_examples_run(code, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("surgsim.control.policies.registry._registered", {})  # a page's policy is its own
     exec(compile(code, "example", "exec"), {"__name__": "__main__"})
     assert capsys.readouterr().out
 

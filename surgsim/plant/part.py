@@ -40,6 +40,7 @@ class PlantPart:
     Attributes:
         columns: What it adds to the trace.
         touches_tip: Whether it can press on the instrument's tip, so that the force there is measured.
+        adds_joints: Joints that it adds to the instrument, after the arm's.
         rank: Where it stands in the chains of `actuate` and `sense`: lower first, then as in the scenario.
         ranks: The same by the hook's name, where it differs.
         kernels: Compiled hooks by name, which stand for the methods of that name:
@@ -51,6 +52,7 @@ class PlantPart:
 
     columns: tuple[Block, ...] = ()
     touches_tip: bool = False
+    adds_joints: int = 0
     rank: int = 0
     ranks: Mapping[str, int] = {}
     kernels: Mapping[str, Any] = {}

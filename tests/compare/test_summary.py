@@ -102,7 +102,7 @@ def test_where_each_fails(runs_of):
     }
 
 
-@pytest.mark.parametrize("suite", ["nominal", "theatre"])
+@pytest.mark.parametrize("suite", ["nominal", "theatre_ideal"])
 def test_the_first_sentence_of_the_reference_runs_against_plain_arithmetic(suite):
     """The figures of the sentence, from the rows alone."""
     table = read_table(RESULTS / suite)

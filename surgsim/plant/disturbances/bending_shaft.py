@@ -76,6 +76,8 @@ class BendingShaft(Disturbance):
     for along the straight shaft.
     """
 
+    adds_joints = len(BEND_JOINTS)
+
     def __init__(self, config: BendingShaftConfig) -> None:
         self._c = config
 
