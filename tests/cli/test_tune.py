@@ -118,9 +118,9 @@ def test_an_interrupted_tuning_leaves_the_best_so_far_and_is_gone_on_with(here, 
     assert "surgsim: interrupted; the best so far is in parts" in capsys.readouterr().err
     first = summary("parts")
     assert (first["finished"], first["runs"], first["margins"]) == (False, 2, None)
-    assert "# interrupted" in Path("parts", FILE).read_text()
+    assert "# interrupted" in Path("parts", FILE).read_text(encoding="utf-8")
     assert len(lines("parts")) == 5
-    with Path("parts", "evaluations.jsonl").open("a") as file:
+    with Path("parts", "evaluations.jsonl").open("a", encoding="utf-8") as file:
         file.write('{"candidate": 3, "ga')  # as a killed process leaves it
 
     rest = here()
@@ -128,7 +128,7 @@ def test_an_interrupted_tuning_leaves_the_best_so_far_and_is_gone_on_with(here, 
     whole = here()
     assert main([*SMALL, "--budget", "8", "--out", "whole"]) == 0
     assert summary("parts") == summary("whole")
-    assert Path("parts", FILE).read_text() == Path("whole", FILE).read_text()
+    assert Path("parts", FILE).read_text(encoding="utf-8") == Path("whole", FILE).read_text(encoding="utf-8")
     assert len(rest.folders) == len(whole.folders) - 5
     nothing = here()
     assert main([*SMALL, "--budget", "8", "--out", "whole", "--resume"]) == 0
@@ -141,7 +141,7 @@ def test_runs_of_other_code_are_run_again(here):
     assert main([*SMALL, "--budget", "4", "--out", "t"]) == 0
     file = Path("t/evaluations.jsonl")
     old = lines("t")
-    file.write_text("".join(json.dumps({**line, "code_sha256": "0" * 64}) + "\n" for line in old))
+    file.write_text("".join(json.dumps({**line, "code_sha256": "0" * 64}) + "\n" for line in old), encoding="utf-8")
     again = here()
     assert main([*SMALL, "--budget", "4", "--out", "t", "--resume"]) == 0
     assert len(again.folders) == len(old)
@@ -152,7 +152,7 @@ def test_processes_do_not_change_the_result(tmp_path, monkeypatch, capfd):
     for jobs in ("1", "2"):
         assert main([*SMALL, "--budget", "6", "--jobs", jobs, "--out", f"jobs{jobs}"]) == 0
     assert summary("jobs1") == summary("jobs2")
-    assert Path("jobs1", FILE).read_text() == Path("jobs2", FILE).read_text()
+    assert Path("jobs1", FILE).read_text(encoding="utf-8") == Path("jobs2", FILE).read_text(encoding="utf-8")
     assert multiprocessing.active_children() == []
 
 
@@ -203,7 +203,7 @@ def test_a_controller_that_is_not_there_is_refused(here, capsys):
 def test_a_folder_of_something_else_or_of_a_tuning_is_not_written_over(here, capsys):
     here()
     Path("mine").mkdir()
-    Path("mine/notes.txt").write_text("mine")
+    Path("mine/notes.txt").write_text("mine", encoding="utf-8")
     assert main([*SMALL, "--budget", "4", "--out", "mine", "--resume"]) == 2
     assert "mine holds 'notes.txt', which is not of this tuning" in capsys.readouterr().err
     assert main([*SMALL, "--budget", "4", "--out", "t"]) == 0
@@ -215,6 +215,6 @@ def test_a_folder_of_something_else_or_of_a_tuning_is_not_written_over(here, cap
 def test_a_damaged_file_of_runs_is_refused(here, capsys, text):
     here()
     Path("t").mkdir()
-    Path("t/evaluations.jsonl").write_text(text)
+    Path("t/evaluations.jsonl").write_text(text, encoding="utf-8")
     assert main([*SMALL, "--budget", "4", "--out", "t", "--resume"]) == 2
     assert "t/evaluations.jsonl: cannot be read: " in capsys.readouterr().err
