@@ -141,7 +141,9 @@ def test_runs_of_other_code_are_run_again(here):
     assert main([*SMALL, "--budget", "4", "--out", "t"]) == 0
     file = Path("t/evaluations.jsonl")
     old = lines("t")
-    file.write_text("".join(json.dumps({**line, "code_sha256": "0" * 64}) + "\n" for line in old), encoding="utf-8")
+    file.write_text(
+        "".join(json.dumps({**line, "code_sha256": "0" * 64}) + "\n" for line in old), encoding="utf-8"
+    )
     again = here()
     assert main([*SMALL, "--budget", "4", "--out", "t", "--resume"]) == 0
     assert len(again.folders) == len(old)
