@@ -1,6 +1,7 @@
 """What every disturbance has: its config's base and the spread over seeds."""
 
 import copy
+import math
 from abc import ABC, abstractmethod
 from typing import Annotated, Literal
 
@@ -9,7 +10,8 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from surgsim.catalog import PartConfig
-from surgsim.plant.part import PlantPart
+from surgsim.compiled import compiled
+from surgsim.plant.part import BLOCK_TICKS, PlantPart
 from surgsim.spatial import unit
 
 Array = NDArray[np.float64]
@@ -66,6 +68,37 @@ def whole_ticks(name: str, key: str, time_s: float, control_period_s: float) -> 
             f"{name}: {key} {time_s:g} must be a whole multiple of control_period_s {control_period_s:g}"
         )
     return round(ratio)
+
+
+@compiled
+def drawn_row(tick: int) -> int:
+    """Row of what a sensor drew for a tick: that of the start comes first, then those of `BLOCK_TICKS`."""
+    return 0 if tick == 0 else (tick - 1) % BLOCK_TICKS + 1
+
+
+@compiled
+def frame_at(t_s: float, rate_hz: float) -> int:
+    """Frames that a tracker has begun by `t_s` [s], the first at the start."""
+    return math.floor(t_s * rate_hz + 1e-6) + 1
+
+
+def check_rate(name: str, key: str, rate_hz: float, control_period_s: float) -> None:
+    """Refuse a sensor that measures more often than once a control period.
+
+    Args:
+        name: The disturbance, for the message.
+        key: Of the rate.
+        rate_hz: Measurements per second [Hz].
+        control_period_s: The control period [s].
+
+    Raises:
+        ValueError: If it does.
+    """
+    if rate_hz * control_period_s > 1.0 + 1e-9:
+        raise ValueError(
+            f"{name}: {key} {rate_hz:g} must be at most one measurement a control period, "
+            f"{1.0 / control_period_s:g} Hz"
+        )
 
 
 class DisturbanceConfig(PartConfig, ABC):

@@ -12,7 +12,15 @@ from pydantic import Field, NonNegativeFloat, PositiveFloat
 from surgsim.catalog import Surroundings
 from surgsim.compiled import compiled
 from surgsim.models.build import Scene
-from surgsim.plant.disturbances.base import SENSOR, Disturbance, DisturbanceConfig, whole_ticks
+from surgsim.plant.disturbances.base import (
+    SENSOR,
+    Disturbance,
+    DisturbanceConfig,
+    check_rate,
+    drawn_row,
+    frame_at,
+    whole_ticks,
+)
 from surgsim.plant.part import BLOCK_TICKS
 from surgsim.tick.algebra import dot
 from surgsim.tick.arrays import World
@@ -50,9 +58,9 @@ def track(gains: Array, world: World, memory: Array, out: Array) -> int:
     """
     now, ring = world.tick, memory[SLOTS + (BLOCK_TICKS + 1) * DRAWS :]
     slots = ring.size // SAMPLE
-    row = 0 if now == 0 else (now - 1) % BLOCK_TICKS + 1
+    row = drawn_row(now)
     drawn = memory[SLOTS + row * DRAWS : SLOTS + (row + 1) * DRAWS]
-    frame = math.floor(world.t_s * gains[RATE] + 1e-6) + 1
+    frame = frame_at(world.t_s, gains[RATE])
     if frame != memory[FRAME]:
         memory[FRAME] = frame
         if world.t_s < gains[LOST] and drawn[6] >= gains[DROPOUT]:
@@ -162,11 +170,7 @@ class InstrumentTrackerConfig(DisturbanceConfig):
     def check(self, scenario: Surroundings) -> None:
         """Refuse a tracker faster than the control ticks, or a delay that is not of whole ones."""
         whole_ticks("instrument_tracker", "delay_s", self.delay_s, scenario.control_period_s)
-        if self.rate_hz * scenario.control_period_s > 1.0 + 1e-9:
-            raise ValueError(
-                f"instrument_tracker: rate_hz {self.rate_hz:g} must be at most one measurement a control "
-                f"period, {1.0 / scenario.control_period_s:g} Hz"
-            )
+        check_rate("instrument_tracker", "rate_hz", self.rate_hz, scenario.control_period_s)
 
     def build(self, rng: np.random.Generator) -> "InstrumentTracker":
         """The tracker, its field drawn."""

@@ -12,7 +12,14 @@ from pydantic import Field, NonNegativeFloat, PositiveFloat
 from surgsim.catalog import Surroundings
 from surgsim.compiled import compiled
 from surgsim.models.build import Scene
-from surgsim.plant.disturbances.base import SENSOR, Disturbance, DisturbanceConfig
+from surgsim.plant.disturbances.base import (
+    SENSOR,
+    Disturbance,
+    DisturbanceConfig,
+    check_rate,
+    drawn_row,
+    frame_at,
+)
 from surgsim.plant.part import BLOCK_TICKS
 from surgsim.tick.arrays import World
 from surgsim.tick.status import GOES_ON
@@ -38,7 +45,7 @@ def measure(gains: Array, world: World, memory: Array, out: Array) -> int:
     """
     n = world.q_m.size
     width = 3 * n + 6
-    row = 0 if world.tick == 0 else (world.tick - 1) % BLOCK_TICKS + 1
+    row = drawn_row(world.tick)
     noise = memory[NOISE + row * width : NOISE + (row + 1) * width]
     last = memory[NOISE + (BLOCK_TICKS + 1) * width :]
     step, keep = gains[RESOLUTION], gains[KEEP]
@@ -67,7 +74,7 @@ def measure(gains: Array, world: World, memory: Array, out: Array) -> int:
 @compiled
 def _track(gains: Array, world: World, memory: Array) -> None:
     """The port's position, measured at the tracker's rate."""
-    frame = math.floor(world.t_s * gains[RATE] + 1e-6) + 1
+    frame = frame_at(world.t_s, gains[RATE])
     for i in range(3):
         if frame != memory[FRAME]:
             memory[PORT + i] = world.p_WC_m[i]
@@ -112,11 +119,8 @@ class SensorNoiseConfig(DisturbanceConfig):
 
     def check(self, scenario: Surroundings) -> None:
         """Refuse a tracker or a low-pass faster than the control ticks can follow."""
-        if self.port_rate_hz is not None and self.port_rate_hz * scenario.control_period_s > 1.0 + 1e-9:
-            raise ValueError(
-                f"sensor_noise: port_rate_hz {self.port_rate_hz:g} must be at most one measurement a control "
-                f"period, {1.0 / scenario.control_period_s:g} Hz"
-            )
+        if self.port_rate_hz is not None:
+            check_rate("sensor_noise", "port_rate_hz", self.port_rate_hz, scenario.control_period_s)
         if self.velocity == "differentiated" and self.velocity_cutoff_hz * scenario.control_period_s > 0.5:
             raise ValueError(
                 f"sensor_noise: velocity_cutoff_hz {self.velocity_cutoff_hz:g} must be at most half the "
