@@ -44,7 +44,7 @@ from surgsim.compiled import compiled
 from surgsim.control.filters import filter_gains
 from surgsim.models.arm import ArmModel
 from surgsim.models.drive import Drive
-from surgsim.tick.algebra import back_substitute, factor
+from surgsim.tick.algebra import back_substitute, factor, times
 from surgsim.tick.arrays import Seen
 from surgsim.tick.nominal import dynamics, kinematics
 from surgsim.tick.scratch import scratch, scratch_matrix
@@ -56,10 +56,11 @@ Q, V, S, W, LINK, MOTOR, REST, DRY, FRICTION = range(9)
 ROWS = 9
 LINK_STATE, LINK_CUTOFF, MOTOR_STATE, MOTOR_CUTOFF, BAND, LEARNING, DELAY, RATE = range(8)
 """Places of the numbers; after them the rows of the drives."""
-LONGEST_PERIOD_S = 0.004
 DRIVES = 8
 STIFFNESS, APPARENT, LOOP, DAMPING, ARMATURE = range(5)
 """Rows of the drives (5, n): K, B_s, D_s, D_l, and B_s as it is part of the nominal inertia."""
+LONGEST_PERIOD_S = 0.004
+"""Control period up to which the gears can be followed [s]."""
 
 
 class ElasticObserverConfig(PartConfig):
@@ -244,15 +245,13 @@ def step(drives: Array, M: Array, L: Array, rest: Array, f: Array, u: Array, dt:
     """
     n = rest.size
     push, v = scratch(n), scratch(n)
+    times(M, x[V], v)
     for i in range(n):
         K, slip = drives[STIFFNESS, i], x[W, i] - x[V, i]
         beta, kappa = drives[APPARENT, i] / dt, 0.25 * K * dt
         mu = kappa + 0.5 * drives[LOOP, i]
         push[i] = beta * x[W, i] + u[i] - f[i] - K * x[S, i] - mu * slip
-        total = 0.0
-        for j in range(n):
-            total += M[i, j] * x[V, j]
-        v[i] = total / dt + rest[i] - 0.5 * drives[DAMPING, i] * x[V, i]
+        v[i] = v[i] / dt + rest[i] - 0.5 * drives[DAMPING, i] * x[V, i]
         v[i] += K * x[S, i] + kappa * slip + kappa * push[i] / (beta + mu)
     back_substitute(L, v)
     for i in range(n):
@@ -270,9 +269,10 @@ def _correct(numbers: Array, drives: Array, M: Array, seen: Seen, rows: Array) -
     n, dt = seen.q.size, seen.dt_s
     a, b, g = filter_gains(numbers[LINK_STATE], numbers[LINK_CUTOFF], dt)
     a_m, b_m, g_m = filter_gains(numbers[MOTOR_STATE], numbers[MOTOR_CUTOFF], dt)
-    e = scratch(n)
+    e, moved = scratch(n), scratch(n)
     for i in range(n):
         e[i] = seen.q[i] - rows[Q, i]
+    times(M, e, moved)
     for i in range(n):
         short = seen.tau[i] / drives[STIFFNESS, i] - rows[S, i]
         whole = e[i] + short
@@ -281,7 +281,4 @@ def _correct(numbers: Array, drives: Array, M: Array, seen: Seen, rows: Array) -
         rows[S, i] += a_m * short
         rows[W, i] += b_m * whole / dt
         rows[MOTOR, i] -= g_m * drives[APPARENT, i] * whole / (dt * dt)
-        total = 0.0
-        for j in range(n):
-            total += M[i, j] * e[j]
-        rows[LINK, i] += g * total / (dt * dt)
+        rows[LINK, i] += g * moved[i] / (dt * dt)

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surgsim.compiled import compiled
-from surgsim.tick.algebra import back_substitute, factor
+from surgsim.tick.algebra import back_substitute, factor, times
 from surgsim.tick.scratch import scratch, scratch_matrix
 
 Array = NDArray[np.float64]
@@ -127,13 +127,11 @@ def observe_positions(
                 speed[i] += dt * rate[i]
         for i in range(n):
             e[i] = q[i] - known[i]
+        times(inertia, e, rate)
         for i in range(n):
             known[i] += gains[0] * e[i]
             speed[i] += gains[1] * e[i] / dt
-            total = 0.0
-            for j in range(n):
-                total += inertia[i, j] * e[j]
-            d[i] += gains[2] * total / (dt * dt)
+            d[i] += gains[2] * rate[i] / (dt * dt)
     for i in range(n):
         rest[i] = bias[i]
         for j in range(n):

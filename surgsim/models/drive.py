@@ -177,4 +177,5 @@ def real_drive(folder: Path) -> DriveConfig | None:
 def _below(low: NotNegative, high: NotNegative) -> bool:
     """Whether a number is below its counterpart; lists of other lengths are found elsewhere."""
     a, b = np.atleast_1d(low), np.atleast_1d(high)
-    return bool(1 in (a.size, b.size, a.size / b.size) and np.any(a < b))
+    alike = a.size == b.size or 1 in (a.size, b.size)
+    return alike and bool(np.any(a < b))

@@ -39,7 +39,7 @@ from surgsim.compiled import compiled
 from surgsim.models.build import Scene
 from surgsim.models.drive import DriveConfig
 from surgsim.models.robot import joint_names, motor_names
-from surgsim.plant.disturbances.base import copied
+from surgsim.plant.disturbances.base import copied, spread_factor
 from surgsim.plant.part import PlantPart
 from surgsim.plant.shaft import bend_joints
 from surgsim.tick.algebra import back_substitute, back_substitute_rows, factor, times
@@ -324,12 +324,7 @@ def _substep(
 def _close_loop(gains: Array, law: Law, memory: Array, ring: Array, x: Array, v: Array) -> None:
     """The torque loop: what it senses, and the motors' torques that follow after their lag."""
     n = x.size
-    K, D = _row(gains, LAW_SIZE, STIFFNESS, n), _row(gains, LAW_SIZE, GEAR, n)
-    loop, bias, wave = (
-        _row(gains, LAW_SIZE, LOOP, n),
-        _row(gains, LAW_SIZE, BIAS, n),
-        _row(gains, LAW_SIZE, WAVE, n),
-    )
+    loop = _row(gains, LAW_SIZE, LOOP, n)
     theta, omega = _row(memory, ACCOUNT_SIZE, THETA, n), _row(memory, ACCOUNT_SIZE, OMEGA, n)
     motor, command = _row(memory, ACCOUNT_SIZE, MOTOR, n), _row(memory, ACCOUNT_SIZE, COMMAND, n)
     known = _row(memory, ACCOUNT_SIZE, FRICTION, n)
@@ -337,18 +332,27 @@ def _close_loop(gains: Array, law: Law, memory: Array, ring: Array, x: Array, v:
         for i in range(2 * n):
             ring[2 * n * k + i] = ring[2 * n * (k - 1) + i]
     for i in range(n):
-        s, relative = theta[i] - x[i], omega[i] - v[i]
-        ring[i] = K[i] * s + D[i] * relative + bias[i]
-        if wave[i] != 0.0:  # a sine costs as much as the rest
-            ring[i] += wave[i] * math.sin(law.waves * theta[i])
-        ring[n + i] = relative
+        ring[i] = _felt(gains, law, n, i, theta[i], x[i], omega[i] - v[i])
+        ring[n + i] = omega[i] - v[i]
     late = 2 * n * law.delay
     for i in range(n):
         wanted = law.ratio * (command[i] - loop[i] * ring[late + n + i])
         wanted += (1.0 - law.ratio) * ring[late + i]
-        if law.observes > 0.0:
-            wanted += known[i]
+        wanted += known[i]
         motor[i] = law.keep * motor[i] + (1.0 - law.keep) * wanted
+
+
+@compiled
+def _felt(gains: Array, law: Law, n: int, i: int, theta: float, x: float, relative: float) -> float:
+    """What a torque sensor says [N m]: the torque of its gear, bias and ripple."""
+    torque: float = (
+        gains[LAW_SIZE + STIFFNESS * n + i] * (theta - x) + gains[LAW_SIZE + GEAR * n + i] * relative
+    )
+    torque += gains[LAW_SIZE + BIAS * n + i]
+    ripple = gains[LAW_SIZE + WAVE * n + i]
+    if ripple != 0.0:  # a sine costs as much as the rest
+        torque += ripple * math.sin(law.waves * theta)
+    return torque
 
 
 @compiled
@@ -392,12 +396,10 @@ def feel(gains: Array, world: World, memory: Array, out: Array) -> int:
     Those on the motors are reported as arms do, q_m = theta - tau_m / K with the measured torque.
     """
     law, n = gains[:LAW_SIZE].view(LAW)[0], world.q.size
-    K, D = _row(gains, LAW_SIZE, STIFFNESS, n), _row(gains, LAW_SIZE, GEAR, n)
-    bias, wave = _row(gains, LAW_SIZE, BIAS, n), _row(gains, LAW_SIZE, WAVE, n)
+    K = _row(gains, LAW_SIZE, STIFFNESS, n)
     theta, omega = _row(memory, ACCOUNT_SIZE, THETA, n), _row(memory, ACCOUNT_SIZE, OMEGA, n)
     for i in range(n):
-        torque = K[i] * (theta[i] - world.q[i]) + D[i] * (omega[i] - world.v[i])
-        world.tau_m[i] = torque + bias[i] + wave[i] * math.sin(law.waves * theta[i])
+        world.tau_m[i] = _felt(gains, law, n, i, theta[i], world.q[i], omega[i] - world.v[i])
         if law.at_motor:
             world.q_m[i], world.v_m[i] = theta[i] - world.tau_m[i] / K[i], omega[i]
     return GOES_ON
@@ -441,7 +443,7 @@ class JointDrives(PlantPart):
         "sense": feel,
         "values": record,
     }
-    ranks: Mapping[str, int] = {"before_step": -1, "after_step": -1, "sense": 0}
+    ranks: Mapping[str, int] = {"before_step": _BEFORE_ALL, "after_step": _BEFORE_ALL, "sense": 0}
 
     def __init__(self, config: DriveConfig, rng: np.random.Generator) -> None:
         self._c, self._rng = config, rng
@@ -469,7 +471,7 @@ class JointDrives(PlantPart):
         )
         drive, h = c.values(n), scene.model.opt.timestep
         drawn = copied(self._rng)
-        spread = 1.0 + c.friction_spread * drawn.uniform(-1.0, 1.0, n)
+        spread = spread_factor(drawn, c.friction_spread, n)
         signs = drawn.choice([-1.0, 1.0], n)
         coulomb = c.each("coulomb_nm", n)
         static = coulomb if c.static_nm is None else c.each("static_nm", n)

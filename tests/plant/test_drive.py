@@ -9,11 +9,12 @@ import scipy.signal
 
 import surgsim
 from surgsim.errors import Outcome
+from surgsim.models import build as building
 from surgsim.models.build import build
 from surgsim.models.config import RobotConfig, SceneConfig
 from surgsim.models.drive import DriveConfig
 from surgsim.models.robot import joint_names
-from surgsim.plant.drive import ACCOUNT_SIZE, LOOP_S, JointDrives
+from surgsim.plant.drive import ACCOUNT_SIZE, COMMAND, LOOP_S, JointDrives
 from surgsim.plant.dynamic import DynamicPlant
 from surgsim.simulate.loop import Simulation
 from surgsim.simulate.setup import prepare
@@ -128,8 +129,6 @@ def two_hinges(config):
                 link.limited = mujoco.mjtLimited.mjLIMITED_FALSE
 
     scene = SceneConfig(robot=RobotConfig(name="fr3"), theatre=False, timestep_s=1e-5)
-    from surgsim.models import build as building  # the scene's own ids do not hold with these joints
-
     spec = mujoco.MjSpec()
     spec.compiler.discardvisual = True
     building._add_arm(spec, scene)
@@ -266,8 +265,6 @@ def test_a_torque_that_changes_too_fast_can_end_the_run():
 def test_the_interface_clips_and_smooths():
     arm = Alone(drives(torque_rate_nm_per_s=100.0, command_cutoff_hz=None, **BARE))
     rows = arm.memory[ACCOUNT_SIZE:].reshape(-1)
-    from surgsim.plant.drive import COMMAND
-
     acting = rows[COMMAND * N : COMMAND * N + N]
     arm.plant.step(np.zeros(N), np.zeros(N))  # where it begins
     arm.plant.step(np.full(N, 5.0), np.zeros(N))
