@@ -36,8 +36,8 @@ def fill_acceleration_bounds(seen: Seen, q: Array, v: Array, low: Array, high: A
     """
     ahead = _HORIZON_TICKS * seen.dt_s
     for i in range(q.size):
-        high[i] = (_top_speed(seen, i, seen.q_max[i] - q[i]) - v[i]) / ahead
-        low[i] = (-_top_speed(seen, i, q[i] - seen.q_min[i]) - v[i]) / ahead
+        high[i] = (top_speed(seen, i, seen.q_max[i] - q[i]) - v[i]) / ahead
+        low[i] = (-top_speed(seen, i, q[i] - seen.q_min[i]) - v[i]) / ahead
 
 
 @compiled
@@ -53,13 +53,13 @@ def allows(torque: Array, torque_limit: Array, qddot: Array, seen: Seen, q: Arra
             return False
         reached = v[i] + ahead * qddot[i]
         room = seen.q_max[i] - q[i] if reached > 0.0 else q[i] - seen.q_min[i]
-        if not abs(reached) <= _top_speed(seen, i, room):
+        if not abs(reached) <= top_speed(seen, i, room):
             return False
     return True
 
 
 @compiled
-def _top_speed(seen: Seen, i: int, room: float) -> float:
+def top_speed(seen: Seen, i: int, room: float) -> float:
     """Speed [rad/s] that joint i may have with `room` [rad] left before its range ends."""
     stop = BRAKING_SHARE * seen.a_max[i]
     speed: float = min(SPEED_SHARE * seen.v_max[i], stopping_speed(room, stop, _GAIN_PER_S, seen.dt_s))

@@ -168,6 +168,12 @@ def look_ahead(numbers: Array, seen: Seen, memory: Array, d: Array) -> int:
 
 
 @compiled
+def last_sent(memory: Array, n: int) -> Array:
+    """The command of the last tick (n,) [N m], where the observer keeps it."""
+    return memory[(ROWS + n) * n : (ROWS + n + 1) * n]
+
+
+@compiled
 def send(numbers: Array, seen: Seen, memory: Array, out: Array, limits: int) -> None:
     """Keep the sum of the terms within the torques, and their rate, that the arm takes; remember it.
 

@@ -265,6 +265,7 @@ def test_the_full_suite_leaves_nothing_out():
         "rcm_elastic_dynamics",
         "joint_elastic_dynamics",
         "joint_impedance_tuned",
+        "rcm_mpc",
     }  # for real drives
     assert set(suite.controllers) == set(shipped("controllers")) - elsewhere
     assert len(expand(suite, folder)) == 3600

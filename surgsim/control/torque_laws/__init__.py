@@ -12,5 +12,6 @@ TORQUE_LAWS = Catalog(
         "policy": f"{__name__}.policy:PolicyLawConfig",
         "rcm_elastic_dynamics": f"{__name__}.rcm_elastic_dynamics:RcmElasticDynamicsConfig",
         "rcm_inverse_dynamics": f"{__name__}.rcm_inverse_dynamics:RcmInverseDynamicsConfig",
+        "rcm_mpc": f"{__name__}.rcm_mpc:RcmMpcConfig",
     },
 )

@@ -31,37 +31,60 @@ TERMS = ("tip", "rcm", "joint", "bias", "observer", "limits")
 
 
 @compiled
-def _task_accelerations(
-    gains: Array, seen: Seen, model: Model, late: float, share: float, J: Array, a: Array
+def fill_task_errors(
+    seen: Seen, model: Model, late: float, ahead: float, J: Array, error: Array, rate: Array, bias: Array
 ) -> None:
-    """Fill rows J (m, n) and accelerations a (m,) of tip and RCM at `model`'s state, `late` [s] from now."""
-    linear, angular, rate = scratch(3), scratch(3), scratch(3)
+    """Errors of tip and RCM, and how they change, at `model`'s state.
+
+    With joint accelerations q'' the second derivative of `error` is J q'' + bias.
+
+    Args:
+        seen: Command and trocar.
+        model: The arm at the state.
+        late: How far the state is from now [s]; the trocar is carried over it.
+        ahead: How far the command is carried on [s].
+        J: Filled with the rows of tip and RCM (m, n), m = 3 without a trocar, else 5.
+        error: Filled with p - p_d and e_N (m,) [m].
+        rate: Filled with their rates (m,) [m/s].
+        bias: Filled with J' q' less the acceleration of the reference (m,) [m/s^2].
+    """
+    linear, angular, speed = scratch(3), scratch(3), scratch(3)
     fill_velocity_products(model.Jv_WT, model.z_W, model.v, linear, angular)
-    ahead = max(late - gains[SENSOR_DELAY], 0.0)
-    times(model.Jv_WT, model.v, rate)
-    square = share * share
+    times(model.Jv_WT, model.v, speed)
     for i in range(3):
         J[i] = model.Jv_WT[i]
-        p_d = seen.p_WTd[i] + ahead * (seen.v_WTd[i] + 0.5 * ahead * seen.a_WTd[i])
-        v_d = seen.v_WTd[i] + ahead * seen.a_WTd[i]
-        pull = square * gains[K_TIP] * (p_d - model.p_WT[i]) + share * gains[D_TIP] * (v_d - rate[i])
-        a[i] = seen.a_WTd[i] - linear[i] + pull
-    if a.size == 3:
+        error[i] = model.p_WT[i] - (seen.p_WTd[i] + ahead * (seen.v_WTd[i] + 0.5 * ahead * seen.a_WTd[i]))
+        rate[i] = speed[i] - (seen.v_WTd[i] + ahead * seen.a_WTd[i])
+        bias[i] = linear[i] - seen.a_WTd[i]
+    if error.size == 3:
         return
     p_WC, v_WC = scratch(3), scratch(3)
     for i in range(3):
         p_WC[i] = seen.p_WC[i] + late * (seen.v_WC[i] + 0.5 * late * seen.a_WC[i])
         v_WC[i] = seen.v_WC[i] + late * seen.a_WC[i]
-    error, moving, bias = scratch(2), scratch(2), scratch(2)
+    moving, curved = scratch(2), scratch(2)
     normals = scratch_matrix(2, 3)
-    fill_rcm(model.p_WT, model.R_WT, model.Jv_WT, model.Jw_WT, p_WC, v_WC, error, J[3:], moving, normals)
+    fill_rcm(model.p_WT, model.R_WT, model.Jv_WT, model.Jw_WT, p_WC, v_WC, error[3:], J[3:], moving, normals)
     fill_rcm_bias(
-        model.p_WT, model.R_WT, model.Jv_WT, model.Jw_WT, model.v, p_WC, v_WC, linear, angular, bias
+        model.p_WT, model.R_WT, model.Jv_WT, model.Jw_WT, model.v, p_WC, v_WC, linear, angular, curved
     )
     for i in range(2):
-        e_dot = dot(J[3 + i], model.v) - moving[i]
-        pull = square * gains[K_RCM] * error[i] + share * gains[D_RCM] * e_dot
-        a[3 + i] = dot(normals[i], seen.a_WC) - bias[i] - pull
+        rate[3 + i] = dot(J[3 + i], model.v) - moving[i]
+        bias[3 + i] = curved[i] - dot(normals[i], seen.a_WC)
+
+
+@compiled
+def _task_accelerations(
+    gains: Array, seen: Seen, model: Model, late: float, share: float, J: Array, a: Array
+) -> None:
+    """Fill rows J (m, n) and accelerations a (m,) of tip and RCM at `model`'s state, `late` [s] from now."""
+    error, rate, bias = scratch(5), scratch(5), scratch(5)
+    m, square = a.size, share * share
+    ahead = max(late - gains[SENSOR_DELAY], 0.0)
+    fill_task_errors(seen, model, late, ahead, J, error[:m], rate[:m], bias[:m])
+    for i in range(m):
+        stiffness, damping = (gains[K_TIP], gains[D_TIP]) if i < 3 else (gains[K_RCM], gains[D_RCM])
+        a[i] = -bias[i] - (square * stiffness * error[i] + share * damping * rate[i])
 
 
 @compiled
