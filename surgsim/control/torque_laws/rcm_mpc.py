@@ -96,7 +96,9 @@ def rows_of(n: int, blocks: int) -> int:
 
 @compiled
 def rcm_mpc(gains: Array, seen: Seen, memory: Array, out: Array) -> int:
-    """U = (M + B_s) u_1 + c + D_l v - d + f: the first of the accelerations u_k, k = 1 .. N, that minimise
+    """U = (M + B_s) u_1 + c + D_l v - d + f, with the first of a horizon's accelerations.
+
+    They are the u_k, k = 1 .. N, that minimise
 
         sum_k |e_T(t_k)|^2 + T_v^2 |e_T'(t_k)|^2 + w_r (|e_N(t_k)|^2 + T_v^2 |e_N'(t_k)|^2)
             + w_q c_1^2 sum_k |u_k - k_q (q_ref - q) - d_q (q_ref' - q')|^2_M / N
