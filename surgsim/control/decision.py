@@ -37,6 +37,10 @@ def measure(seen: Seen, world: World) -> None:
     for i in range(3):
         seen.f_T[i], seen.p_WC[i] = world.f_T_m[i], world.p_WC_m[i]
         seen.v_WC[i], seen.a_WC[i] = world.v_WC_m[i], 0.0
+    seen.has_wrench = world.has_wrench
+    if world.has_wrench:
+        seen.f_S[:] = world.f_S_m
+        seen.m_S[:] = world.m_S_m
     seen.tracked_samples = world.tracked_samples
     if world.tracked_samples > 0:
         seen.tracked_age_s = world.tracked_age_s
@@ -170,6 +174,9 @@ def _referred(c: Control) -> Seen:
     other.roll_rate, other.jaw = seen.roll_rate, seen.jaw
     other.tau[:] = seen.tau
     other.tracked_samples, other.tracked_age_s = seen.tracked_samples, seen.tracked_age_s
+    other.has_wrench = seen.has_wrench
+    other.f_S[:] = seen.f_S
+    other.m_S[:] = seen.m_S
     other.p_WT_m[:] = seen.p_WT_m
     other.R_WT_m[:] = seen.R_WT_m
     other.q_ref[:] = seen.q_ref

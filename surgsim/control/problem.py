@@ -10,6 +10,7 @@ from surgsim.control.bounds import fill_braking_bounds, fill_velocity_bounds
 from surgsim.control.rcm import Rcm
 from surgsim.models.arm import Kinematics
 from surgsim.models.build import JointLimits
+from surgsim.plant.state import Wrench
 from surgsim.tasks.base import TipCommand
 
 Array = NDArray[np.float64]
@@ -35,6 +36,7 @@ class VelocityProblem:
         upper: Upper velocity bounds Omega (n,) [rad/s].
         limits: The arm's joint limits.
         position_gain_per_s: alpha of Omega [1/s].
+        wrench: What a force-torque sensor at the flange measures; None without one.
     """
 
     t_s: float
@@ -50,6 +52,7 @@ class VelocityProblem:
     upper: Array
     limits: JointLimits
     position_gain_per_s: float
+    wrench: Wrench | None = None
 
     @property
     def tip_error(self) -> Array:

@@ -9,6 +9,7 @@ from surgsim.control.problem import VelocityProblem
 from surgsim.control.rcm import Rcm
 from surgsim.models.arm import RCM_ROWS, ArmModel, Dynamics, Kinematics
 from surgsim.models.build import JointLimits
+from surgsim.plant.state import Wrench
 from surgsim.tasks.command import command_of, fill_command_of
 from surgsim.tick.arrays import Seen, new
 from surgsim.tick.fields import Fields
@@ -72,6 +73,20 @@ def rcm_of(seen: Fields) -> Rcm | None:
     )
 
 
+def wrench_of(seen: Fields) -> Wrench | None:
+    """A copy of what the sensor at the flange measures; None without one."""
+    if not seen["has_wrench"][0]:
+        return None
+    return Wrench(force=seen["f_S"].copy(), moment=seen["m_S"].copy())
+
+
+def fill_wrench(seen: Seen, wrench: Wrench | None) -> None:
+    """Write what the sensor at the flange measures into a record."""
+    seen["has_wrench"] = wrench is not None
+    if wrench is not None:
+        seen["f_S"], seen["m_S"] = wrench.force, wrench.moment
+
+
 def velocity_problem_of(seen: Fields, limits: JointLimits) -> VelocityProblem:
     """What a resolver in Python is given."""
     return VelocityProblem(
@@ -88,6 +103,7 @@ def velocity_problem_of(seen: Fields, limits: JointLimits) -> VelocityProblem:
         upper=seen["upper"].copy(),
         limits=limits,
         position_gain_per_s=seen["omega_gain"].item(),
+        wrench=wrench_of(seen),
     )
 
 
@@ -110,6 +126,7 @@ def fill_velocity_problem(seen: Seen, problem: VelocityProblem) -> None:
     limits = problem.limits
     seen["q_min"], seen["q_max"] = limits.q_min, limits.q_max
     seen["v_max"], seen["a_max"] = limits.velocity, limits.acceleration
+    fill_wrench(seen, problem.wrench)
 
 
 def fill_kinematics(seen: Seen, kin: Kinematics) -> None:

@@ -9,6 +9,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from surgsim.errors import SurgsimError
 from surgsim.models.collision import CollisionShapes, collision_shapes
 from surgsim.models.config import RobotConfig, SceneConfig, WallConfig
 from surgsim.models.drive import DriveConfig
@@ -171,6 +172,21 @@ def _ids(values: list[int]) -> Ids:
     ids = np.array(values, dtype=np.intp)
     ids.flags.writeable = False
     return ids
+
+
+def body_at_flange(scene: Scene) -> int:
+    """The body that is mounted on the flange: the instrument, or the holder that bears it.
+
+    Raises:
+        SurgsimError: If there is no instrument.
+    """
+    model = scene.model
+    flange, body = int(model.site_bodyid[scene.flange_site]), int(model.site_bodyid[scene.tip_site])
+    while body > 0 and model.body_parentid[body] != flange:
+        body = int(model.body_parentid[body])
+    if body == 0:
+        raise SurgsimError("there is no instrument at the flange")
+    return body
 
 
 def span(ids: NDArray[np.intp]) -> slice:

@@ -33,6 +33,19 @@ NOT_TRACKED = TrackedPose()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Wrench:
+    """What the surroundings do to the instrument, as a force-torque sensor at the flange measures it.
+
+    Attributes:
+        force: World frame (3,) [N]; the instrument's weight is taken off.
+        moment: About the tip (3,) [N m].
+    """
+
+    force: Array
+    moment: Array
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class State:
     """Measured state of the plant at a control tick. Arrays are the reader's own.
 
@@ -45,6 +58,7 @@ class State:
         v_WC: Trocar velocity as announced to the controller (3,) [m/s]; zeros where nobody announces it.
         f_T: Force of the surroundings on the tip, as a sensor at the tip measures it, world frame (3,) [N].
         tracked: What a tracker says of the instrument.
+        wrench: What a force-torque sensor at the flange measures; None without one.
     """
 
     t_s: float
@@ -55,3 +69,4 @@ class State:
     v_WC: Array
     f_T: Array = field(default_factory=lambda: NO_FORCE)
     tracked: TrackedPose = NOT_TRACKED
+    wrench: Wrench | None = None

@@ -17,7 +17,7 @@ from surgsim.errors import SurgsimError
 from surgsim.models.build import Scene
 from surgsim.plant.bore import Bore
 from surgsim.plant.part import PlantPart
-from surgsim.plant.state import NOT_TRACKED, State, TrackedPose
+from surgsim.plant.state import NOT_TRACKED, State, TrackedPose, Wrench
 from surgsim.tick.arrays import Numbers, Record, World, hook_signature, new, point, type_of
 from surgsim.tick.python_part import PythonPart, first_raised, python_kernel
 from surgsim.tick.status import GOES_ON
@@ -77,6 +77,7 @@ def measured(world: World) -> State:
         v_WC=world.v_WC_m.copy(),
         f_T=world.f_T_m.copy(),
         tracked=_tracked(world),
+        wrench=Wrench(force=world.f_S_m.copy(), moment=world.m_S_m.copy()) if world.has_wrench else None,
     )
 
 
@@ -242,6 +243,9 @@ def hook_call(
         pose = state.tracked
         world.tracked_samples, world.tracked_age_s = pose.samples, pose.age_s
         world.p_WT_m[:], world.R_WT_m[:] = pose.p_WT, pose.R_WT
+        world.has_wrench = state.wrench is not None
+        if state.wrench is not None:
+            world.f_S_m[:], world.m_S_m[:] = state.wrench.force, state.wrench.moment
 
     def record() -> None:
         values()[:] = part.values()

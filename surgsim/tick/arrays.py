@@ -218,6 +218,9 @@ class Seen(Record):
         omega_gain: alpha of Omega [1/s].
         tracked_samples: Poses of the instrument that a tracker has measured so far; 0: there is none.
         tracked_age_s: How much older than q the last of them is [s].
+        has_wrench: 1 with a force-torque sensor at the flange, else 0.
+        f_S: Force of the surroundings on the instrument that it measures (3,) [N].
+        m_S: Their moment about the tip (3,) [N m].
         p_WT_m: Tip position in it (3,) [m].
         R_WT_m: Tip orientation in it (3, 3).
         q: Joint positions at which the kinematics were evaluated (n,) [rad].
@@ -261,6 +264,8 @@ class Seen(Record):
         **{name: shape for name, shape in Model.SHAPES.items()},
         "p_WT_m": "3",
         "R_WT_m": "3 3",
+        "f_S": "3",
+        "m_S": "3",
         "tau": "n",
         "f_T": "3",
         "p_WC": "3",
@@ -296,6 +301,9 @@ class Seen(Record):
     omega_gain: float
     tracked_samples: int
     tracked_age_s: float
+    has_wrench: int
+    f_S: Array
+    m_S: Array
     p_WT_m: Array
     R_WT_m: Array
     q: Array
@@ -524,6 +532,8 @@ class World(Record):
         site_xpos: Site places.
         site_xmat: Site orientations.
         cfrc_ext: External forces on bodies.
+        cfrc_int: Forces between bodies and their parents.
+        subtree_com: Centres of mass of the bodies with all that hangs on them.
         mocap_pos: Places of the mocap bodies.
         sensordata: Sensors.
         nq: Positions.
@@ -552,6 +562,7 @@ class World(Record):
         jaw: How far the jaws are told to close.
         tracked_samples: Poses of the instrument that a tracker has measured so far.
         tracked_age_s: How much older than the measured joint positions the last of them is [s].
+        has_wrench: 1 with a force-torque sensor at the flange, else 0.
         tau_max: Torque limits (n,) [N m].
         torque: Torque on its way to the joints (n,) [N m].
         qdot: The resolver's velocities (n,) [rad/s].
@@ -572,6 +583,8 @@ class World(Record):
         p_WC_m: Trocar as the controller is told (3,) [m].
         v_WC_m: Trocar's velocity as announced (3,) [m/s].
         f_T_m: Measured force on the tip (3,) [N].
+        f_S_m: Force on the instrument that a sensor at the flange measures (3,) [N].
+        m_S_m: Its moment about the tip (3,) [N m].
         p_WT_m: Tip in the tracker's last sample; NaN without one (3,) [m].
         R_WT_m: Tip orientation in it (3, 3).
     """
@@ -579,7 +592,8 @@ class World(Record):
     SHAPES: ClassVar[dict[str, str]] = {
         **{name: "n" for name in ("tau_max", "torque", "qdot", "q", "v", "tau", "q_m", "v_m", "tau_m")},
         **{name: "3" for name in ("p_WT", "p_WR", "p_WC", "f_C", "f_T", "p_WC_m", "v_WC_m", "f_T_m")},
-        **{name: "3" for name in ("port_home", "port_offset", "port_velocity", "p_WT_m")},
+        **{name: "3" for name in ("port_home", "port_offset", "port_velocity")},
+        **{name: "3" for name in ("f_S_m", "m_S_m", "p_WT_m")},
         "R_WT_m": "3 3",
     }
     ADDRESSES: ClassVar[frozenset[str]] = frozenset(
@@ -601,6 +615,8 @@ class World(Record):
             "site_xpos",
             "site_xmat",
             "cfrc_ext",
+            "cfrc_int",
+            "subtree_com",
             "mocap_pos",
             "sensordata",
         )
@@ -622,6 +638,8 @@ class World(Record):
     site_xpos: int
     site_xmat: int
     cfrc_ext: int
+    cfrc_int: int
+    subtree_com: int
     mocap_pos: int
     sensordata: int
     nq: int
@@ -650,6 +668,7 @@ class World(Record):
     jaw: float
     tracked_samples: int
     tracked_age_s: float
+    has_wrench: int
     tau_max: Array
     torque: Array
     qdot: Array
@@ -670,6 +689,8 @@ class World(Record):
     p_WC_m: Array
     v_WC_m: Array
     f_T_m: Array
+    f_S_m: Array
+    m_S_m: Array
     p_WT_m: Array
     R_WT_m: Array
 

@@ -6,6 +6,7 @@ PORT_ESTIMATORS = Catalog(
     "port estimator",
     "surgsim.port_estimators",
     {
+        "admittance": f"{__name__}.admittance:PortAdmittanceConfig",
         "interaction_force": f"{__name__}.interaction_force:InteractionForceConfig",
         "measured": f"{__name__}.measured:MeasuredPortConfig",
         "tracking": f"{__name__}.tracking:TrackingConfig",

@@ -9,8 +9,9 @@ from numpy.typing import NDArray
 
 from surgsim.catalog import Surroundings
 from surgsim.control.failure import ControlFailure, failure_of
-from surgsim.control.seen import dynamics_of, fill_kinematics, kinematics_of, new_seen
+from surgsim.control.seen import dynamics_of, fill_kinematics, fill_wrench, kinematics_of, new_seen, wrench_of
 from surgsim.models.arm import ArmModel, Dynamics, Kinematics
+from surgsim.plant.state import Wrench
 from surgsim.tick.arrays import Seen
 from surgsim.tick.fields import Fields
 from surgsim.tick.status import GOES_ON
@@ -34,6 +35,7 @@ class PortProblem:
         dyn: Nominal dynamics there; None on the kinematic plant.
         p_WC: Trocar position as seen (3,) [m].
         v_WC: Trocar velocity as announced (3,) [m/s].
+        wrench: What a force-torque sensor at the flange measures; None without one.
     """
 
     t_s: float
@@ -45,6 +47,7 @@ class PortProblem:
     dyn: Dynamics | None
     p_WC: Array
     v_WC: Array
+    wrench: Wrench | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -142,6 +145,7 @@ class KernelPortEstimator:
         if p.dyn is not None:
             seen.M[:], seen.bias[:] = p.dyn.mass_matrix, p.dyn.bias
         seen.p_WC[:], seen.v_WC[:] = p.p_WC, p.v_WC
+        fill_wrench(seen, p.wrench)
         return seen
 
 
@@ -157,4 +161,5 @@ def port_problem_of(seen: Fields, *, has_dynamics: bool) -> PortProblem:
         dyn=dynamics_of(seen) if has_dynamics else None,
         p_WC=seen["p_WC"].copy(),
         v_WC=seen["v_WC"].copy(),
+        wrench=wrench_of(seen),
     )

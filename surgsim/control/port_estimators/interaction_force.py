@@ -12,11 +12,11 @@ from surgsim.compiled import compiled
 from surgsim.control.filters import filter_gains
 from surgsim.control.observer import observe_positions, position_observer_size
 from surgsim.control.port_estimators.base import KernelPortEstimator
-from surgsim.control.rcm import fill_rcm
+from surgsim.control.port_force import lateral_force
 from surgsim.models.arm import ArmModel
-from surgsim.tick.algebra import back_substitute, back_substitute_rows, dot, factor, norm, outer_product
+from surgsim.tick.algebra import norm
 from surgsim.tick.arrays import Seen
-from surgsim.tick.scratch import scratch, scratch_matrix
+from surgsim.tick.scratch import scratch
 from surgsim.tick.status import GOES_ON, RANK_LOST
 
 Array = NDArray[np.float64]
@@ -117,7 +117,7 @@ def interaction_force(gains: Array, seen: Seen, memory: Array, out: Array) -> in
     )
     force, push = scratch(3), scratch(3)
     push[:] = 0.0
-    if not _lateral_force(seen, d, force):
+    if not lateral_force(seen, d, force):
         return RANK_LOST
     memory[6] += 1.0
     if t < gains[TARE_S]:
@@ -152,36 +152,3 @@ def interaction_force(gains: Array, seen: Seen, memory: Array, out: Array) -> in
             out[1, i] += w * (c * b - s * a)
             out[2, i] -= w * w * (c * a + s * b)
     return GOES_ON
-
-
-@compiled
-def _lateral_force(seen: Seen, d: Array, out: Array) -> bool:
-    """Lateral force of the wall on the shaft, world frame (3,) [N]; False where J_rcm has lost rank."""
-    n = d.size
-    error, J, velocity = scratch(2), scratch_matrix(2, n), scratch(2)
-    N = scratch_matrix(2, 3)
-    fill_rcm(
-        seen.p_WT,
-        seen.R_WT,
-        seen.Jv_WT,
-        seen.Jw_WT,
-        seen.p_WC,
-        seen.v_WC,
-        error,
-        J,
-        velocity,
-        N,
-    )
-    L, Y, A, f = scratch_matrix(n, n), scratch_matrix(2, n), scratch_matrix(2, 2), scratch(2)
-    L[:], Y[:] = seen.M, J
-    if not factor(L):
-        return False
-    back_substitute_rows(L, Y)
-    outer_product(Y, J, A)
-    if not factor(A):
-        return False
-    f[0], f[1] = dot(Y[0], d), dot(Y[1], d)
-    back_substitute(A, f)
-    for i in range(3):
-        out[i] = N[0, i] * f[0] + N[1, i] * f[1]
-    return True

@@ -7,6 +7,7 @@ RESOLVERS = Catalog(
     "surgsim.resolvers",
     {
         "gradient": "surgsim.control.resolvers.gradient:GradientConfig",
+        "hands_on": "surgsim.control.resolvers.hands_on:HandsOnConfig",
         "mink": "surgsim.control.resolvers.mink:MinkConfig",
         "passive_qp": "surgsim.control.resolvers.passive_qp:PassiveQpConfig",
         "pinv": "surgsim.control.resolvers.pinv:PinvConfig",

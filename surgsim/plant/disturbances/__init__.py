@@ -10,6 +10,7 @@ DISTURBANCES = Catalog(
         "bending_shaft": "surgsim.plant.disturbances.bending_shaft:BendingShaftConfig",
         "breathing": "surgsim.plant.disturbances.breathing:BreathingConfig",
         "calibration_error": "surgsim.plant.disturbances.calibration_error:CalibrationErrorConfig",
+        "force_torque_sensor": "surgsim.plant.disturbances.force_torque_sensor:ForceTorqueSensorConfig",
         "gravity_error": "surgsim.plant.disturbances.gravity_error:GravityErrorConfig",
         "guiding_hand": "surgsim.plant.disturbances.guiding_hand:GuidingHandConfig",
         "inertia_error": "surgsim.plant.disturbances.inertia_error:InertiaErrorConfig",

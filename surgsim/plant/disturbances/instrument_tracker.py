@@ -177,7 +177,7 @@ class InstrumentTrackerConfig(DisturbanceConfig):
         return InstrumentTracker(self, rng)
 
 
-def _straight_tip(scene: Scene) -> Array:
+def straight_tip(scene: Scene) -> Array:
     """Place [m] and orientation (12,) of the tip in the frame of the entry, with the shaft straight."""
     model, entry, tip = scene.model, scene.shaft_entry_site, scene.tip_site
     data = mujoco.MjData(model)  # at the positions that the model is made at
@@ -214,7 +214,7 @@ class InstrumentTracker(Disturbance):
             c.field_m,
             c.field_angle_rad,
         )
-        self.gains = np.concatenate((own, _straight_tip(scene), self._waves.ravel()))
+        self.gains = np.concatenate((own, straight_tip(scene), self._waves.ravel()))
         slots = math.ceil(c.delay_s * c.rate_hz) + 2
         self.memory = np.zeros(SLOTS + (BLOCK_TICKS + 1) * DRAWS + slots * SAMPLE)
 

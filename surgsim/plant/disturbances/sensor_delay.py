@@ -15,13 +15,13 @@ from surgsim.tick.arrays import World
 from surgsim.tick.status import GOES_ON
 
 Array = NDArray[np.float64]
-_OTHERS = 23
-"""Numbers of a row beside those of the joints: port, tip force, and the tracker's last sample."""
+_OTHERS = 29
+"""Numbers of a row beside those of the joints: port, forces on tip and flange, the tracker's last sample."""
 
 
 @compiled
 def _write(world: World, row: Array) -> None:
-    """What is measured now, to a row (3 n + 23,)."""
+    """What is measured now, to a row (3 n + 29,)."""
     n = world.q_m.size
     for i in range(n):
         row[i], row[n + i], row[2 * n + i] = world.q_m[i], world.v_m[i], world.tau_m[i]
@@ -32,6 +32,7 @@ def _write(world: World, row: Array) -> None:
             world.f_T_m[i],
         )
         row[3 * n + 9 + i] = world.p_WT_m[i]
+        row[3 * n + 23 + i], row[3 * n + 26 + i] = world.f_S_m[i], world.m_S_m[i]
         for k in range(3):
             row[3 * n + 12 + 3 * i + k] = world.R_WT_m[i, k]
     row[3 * n + 21], row[3 * n + 22] = world.tracked_samples, world.tracked_age_s
@@ -39,7 +40,7 @@ def _write(world: World, row: Array) -> None:
 
 @compiled
 def _read(world: World, row: Array) -> None:
-    """What was measured, from a row (3 n + 23,)."""
+    """What was measured, from a row (3 n + 29,)."""
     n = world.q_m.size
     for i in range(n):
         world.q_m[i], world.v_m[i], world.tau_m[i] = row[i], row[n + i], row[2 * n + i]
@@ -48,6 +49,7 @@ def _read(world: World, row: Array) -> None:
         world.v_WC_m[i] = row[3 * n + 3 + i]
         world.f_T_m[i] = row[3 * n + 6 + i]
         world.p_WT_m[i] = row[3 * n + 9 + i]
+        world.f_S_m[i], world.m_S_m[i] = row[3 * n + 23 + i], row[3 * n + 26 + i]
         for k in range(3):
             world.R_WT_m[i, k] = row[3 * n + 12 + 3 * i + k]
     world.tracked_samples, world.tracked_age_s = int(row[3 * n + 21]), row[3 * n + 22]
@@ -72,7 +74,7 @@ def delay(gains: Array, world: World, memory: Array, out: Array) -> int:
 
 
 class SensorDelayConfig(DisturbanceConfig):
-    """The whole measured state is old: joints, torques, port, tip force, instrument; the time is the present.
+    """The whole measured state is old: joints, torques, port, forces, instrument; the time is the present.
 
     Attributes:
         delay_s: Its age, a whole multiple of the control period [s].

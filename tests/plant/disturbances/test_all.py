@@ -15,6 +15,7 @@ SPREAD = {
     "actuation_delay": ", jitter_s: 0.003",
     "breathing": ", random_phase: true, spread: 0.5",
     "calibration_error": "",
+    "force_torque_sensor": "",
     "gravity_error": ", direction: random, spread: 0.5",
     "guiding_hand": "",
     "inertia_error": ", spread: 0.5",
@@ -29,7 +30,7 @@ SPREAD = {
     "trocar_calibration": ", direction: random, spread: 0.5",
 }
 """What makes each draw something; the others draw nothing."""
-MEASURED = ("instrument_tracker", "sensor_delay", "sensor_noise", "trocar_calibration")
+MEASURED = ("force_torque_sensor", "instrument_tracker", "sensor_delay", "sensor_noise", "trocar_calibration")
 """Those that change what is measured and nothing else."""
 ONCE = "bending_shaft"
 """A shaft has one tube; a second one is refused."""
@@ -43,12 +44,16 @@ def _item(name):
 
 def _uses(name):
     """What lets a controller use what is measured."""
-    return ["controller.instrument={type: tracked}"] if name == "instrument_tracker" else []
+    return {
+        "instrument_tracker": ["controller.instrument={type: tracked}"],
+        "force_torque_sensor": ["controller.resolver={type: hands_on, dead_zone_n: 0, tare_s: 0}"],
+    }.get(name, [])
 
 
 def _seen(state):
     """What is measured of joints, port and instrument."""
-    return np.concatenate((state.q, state.p_WC, [state.tracked.samples], state.tracked.p_WT))
+    force = np.full(3, np.nan) if state.wrench is None else state.wrench.force
+    return np.concatenate((state.q, state.p_WC, [state.tracked.samples], state.tracked.p_WT, force))
 
 
 def _list(*names):

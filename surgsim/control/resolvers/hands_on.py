@@ -1,0 +1,210 @@
+"""Hands-on guidance: the tip gives way to a hand as a mass would, the shaft stays in the port."""
+
+from typing import Annotated, Any, Literal, Union
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field, NonNegativeFloat, PositiveFloat
+
+from surgsim.catalog import PartConfig
+from surgsim.columns import vector, width
+from surgsim.compiled import compiled
+from surgsim.control.inside import HEAD_SIZE, resolve_below
+from surgsim.control.joining import memory_size
+from surgsim.control.planes import PlaneConfig, plane_numbers
+from surgsim.control.port_force import split_wrench
+from surgsim.control.redundancy import redundancy_needed
+from surgsim.control.resolvers import RESOLVERS
+from surgsim.control.resolvers.base import KernelResolver
+from surgsim.control.resolvers.pinv import PinvConfig
+from surgsim.models.arm import ArmModel
+from surgsim.tick.algebra import dot, norm
+from surgsim.tick.arrays import Resolved, Seen
+from surgsim.tick.scratch import scratch
+from surgsim.tick.status import GOES_ON
+
+Array = NDArray[np.float64]
+_OTHERS = tuple(RESOLVERS.usable(name) for name in RESOLVERS.names() if name not in ("policy", "hands_on"))
+AnyPlainResolver: Any = Annotated[Union[_OTHERS], Field(discriminator="type", title="resolver")]  # noqa: UP007
+MASS, DAMPING, STIFFNESS, DEAD_ZONE, HAND, LEAST_DEPTH, TARE_S, MOST, BARRIER, RANGE, COLUMN, WALLS = range(
+    HEAD_SIZE, HEAD_SIZE + 12
+)
+"""Places of the gains; COLUMN is where its own columns begin, WALLS where each wall has four numbers."""
+AWAY, RATE, TARE, TICKS, BELOW = slice(0, 3), slice(3, 6), slice(6, 9), 9, 10
+"""Memory: e (3,) [m], its rate (3,) [m/s], tare (3,) [N], ticks; then that of the resolver below."""
+
+
+class HandsOnConfig(PartConfig):
+    """Lets a hand lead the tip, by the force that a sensor at the flange measures.
+
+    Attributes:
+        mass_kg: M of the admittance at the tip [kg].
+        damping_n_s_per_m: D [N s/m].
+        stiffness_n_per_m: K, that pulls the tip back to its path [N/m]; 0: it stays where it was led to.
+        dead_zone_n: Forces of the hand below this move nothing [N].
+        hand_from_tip_m: Where the hand holds the shaft, from the tip [m].
+        least_depth_m: The lever from port to tip counts as at least this [m].
+        tare_s: The mean force over this first time is taken off; nobody may hold the instrument so long [s].
+        most_m: Farthest that the tip may be led from its path [m].
+        planes: Walls of the region that the tip is kept in.
+        barrier_n_m2: Strength of the walls' repulsion [N m^2].
+        barrier_range_m: How near to a wall it begins [m].
+        resolver: Resolves the tip's motion and holds the RCM.
+    """
+
+    type: Literal["hands_on"] = "hands_on"
+    mass_kg: PositiveFloat = 2.0
+    damping_n_s_per_m: PositiveFloat = 30.0
+    stiffness_n_per_m: NonNegativeFloat = 0.0
+    dead_zone_n: NonNegativeFloat = 0.3
+    hand_from_tip_m: Annotated[float, Field(gt=0.0, le=1.0)] = 0.4
+    least_depth_m: Annotated[float, Field(gt=0.0, le=0.3)] = 0.05
+    tare_s: NonNegativeFloat = 0.2
+    most_m: PositiveFloat = 0.1
+    planes: tuple[PlaneConfig, ...] = ()
+    barrier_n_m2: NonNegativeFloat = 1e-6
+    barrier_range_m: PositiveFloat = 0.02
+    resolver: AnyPlainResolver = PinvConfig()
+
+    @property
+    def needs_redundancy(self) -> int:
+        """As much as the resolver below."""
+        return redundancy_needed(self.resolver)
+
+    def build(self, arm: ArmModel) -> KernelResolver:
+        """The resolver."""
+        own = (
+            self.mass_kg,
+            self.damping_n_s_per_m,
+            self.stiffness_n_per_m,
+            self.dead_zone_n,
+            self.hand_from_tip_m,
+            self.least_depth_m,
+            self.tare_s,
+            self.most_m,
+            self.barrier_n_m2,
+            self.barrier_range_m,
+        )
+        below: Any = self.resolver.build(arm)
+        columns = tuple(getattr(below, "columns", ()))
+        return KernelResolver(
+            kernel=hands_on,
+            arm=arm,
+            gains=np.concatenate((np.zeros(HEAD_SIZE), own, (width(columns),), plane_numbers(self.planes))),
+            memory_size=BELOW + memory_size(below),
+            columns=(*columns, vector("hand_force", "n")),
+            below=below,
+        )
+
+
+@compiled
+def hands_on(gains: Array, seen: Seen, memory: Array, out: Resolved) -> int:
+    """The tip is led away from its path by e, and the resolver below follows p_WTd + e.
+
+        M e'' + D e' + K e = F_T - grad V,   F_T = (F_h z) z - ((l - s)/s) N F_h
+
+    F_h is the force of a hand on the shaft, l above the tip, told apart from that of the wall at the depth s
+    by the moment (`surgsim.control.port_force.split_wrench`); along the shaft all of the force is taken for
+    the hand's. F_T does the same work at the tip as F_h does at the hand, with the shaft turning about the
+    port: so the hand feels a passive body, whatever the lever is. V keeps the tip on the inner side of the
+    walls n p <= o: with the gap g = o - n p and its range g_0,
+
+        - grad V = - k (1/g - 1/g_0) / g^2 n     for g < g_0
+
+    Semi-implicit Euler with implicit damping. Without a sensor at the flange nothing is felt.
+
+    Source: the target admittance with RCM constraint and forbidden regions of Kastritsi and Doulgeri
+    (arXiv 2202.10783), whose gains and variable damping were not seen; the RCM is held by the rows of the
+    resolver here, not by a potential. V is that of Khatib, Int. J. Robotics Research 5:90 (1986).
+    """
+    dt = seen.dt_s
+    away, rate, tare = memory[AWAY], memory[RATE], memory[TARE]
+    hand, force = scratch(3), scratch(3)
+    _felt(gains, seen, hand)
+    memory[TICKS] += 1.0
+    if seen.t_s < gains[TARE_S]:
+        for i in range(3):
+            tare[i] += (hand[i] - tare[i]) / memory[TICKS]
+            hand[i] = 0.0
+    else:
+        for i in range(3):
+            hand[i] -= tare[i]
+        size = norm(hand)
+        for i in range(3):
+            hand[i] *= max(1.0 - gains[DEAD_ZONE] / size, 0.0) if size > 0.0 else 0.0
+    _at_tip(gains, seen, hand, force)
+    _repel(gains, seen, away, force)
+    kept = scratch(9)
+    for i in range(3):
+        kept[i], kept[3 + i], kept[6 + i] = seen.p_WTd[i], seen.v_WTd[i], seen.a_WTd[i]
+        before = rate[i]
+        moving = gains[MASS] * before + dt * (force[i] - gains[STIFFNESS] * away[i])
+        rate[i] = moving / (gains[MASS] + dt * gains[DAMPING])
+        away[i] += dt * rate[i]
+        seen.a_WTd[i] += (rate[i] - before) / dt
+    size = norm(away)
+    for i in range(3):
+        if size > gains[MOST]:
+            away[i] *= gains[MOST] / size
+            rate[i] = 0.0
+            seen.a_WTd[i] = kept[6 + i]
+        seen.p_WTd[i] += away[i]
+        seen.v_WTd[i] += rate[i]
+    status = resolve_below(gains, seen, memory[BELOW:], out)
+    if status != GOES_ON:  # what is seen stays as the resolver below saw it, for who looks into it
+        return status
+    own = int(gains[COLUMN])
+    for i in range(3):
+        out.p_WTd[i], out.v_WTd[i], out.a_WTd[i] = seen.p_WTd[i], seen.v_WTd[i], seen.a_WTd[i]
+        seen.p_WTd[i], seen.v_WTd[i], seen.a_WTd[i] = kept[i], kept[3 + i], kept[6 + i]
+        out.values[own + i] = hand[i]
+    return GOES_ON
+
+
+@compiled
+def _felt(gains: Array, seen: Seen, hand: Array) -> None:
+    """Fill the force of the hand on the shaft (3,) [N]; zeros where nothing is felt."""
+    port = scratch(3)
+    for i in range(3):
+        hand[i] = 0.0
+    if not seen.has_wrench:
+        return
+    along = 0.0
+    for i in range(3):
+        along += seen.R_WT[i, 2] * seen.f_S[i]
+    if seen.has_trocar:
+        split_wrench(seen, gains[HAND], port, hand)
+    else:
+        for i in range(3):
+            hand[i] = seen.f_S[i] - along * seen.R_WT[i, 2]
+    for i in range(3):
+        hand[i] += along * seen.R_WT[i, 2]
+
+
+@compiled
+def _at_tip(gains: Array, seen: Seen, hand: Array, force: Array) -> None:
+    """Fill the force at the tip (3,) [N] that does the work of the hand, by the lever about the port."""
+    along, lever = 0.0, -1.0
+    for i in range(3):
+        along += seen.R_WT[i, 2] * hand[i]
+    if seen.has_trocar:
+        depth = max(seen.depth, gains[LEAST_DEPTH])
+        lever = (gains[HAND] - depth) / depth
+    for i in range(3):
+        axial = along * seen.R_WT[i, 2]
+        force[i] = axial - lever * (hand[i] - axial)
+
+
+@compiled
+def _repel(gains: Array, seen: Seen, away: Array, force: Array) -> None:
+    """Add the repulsion of the walls on the commanded tip, of which a thousandth of the range is kept off."""
+    reach = gains[RANGE]
+    for at in range(WALLS, gains.size, 4):
+        normal, place = gains[at : at + 3], scratch(3)
+        for i in range(3):
+            place[i] = seen.p_WTd[i] + away[i]
+        gap = max(gains[at + 3] - dot(normal, place), 1e-3 * reach)
+        if gap < reach:
+            size = gains[BARRIER] * (1.0 / gap - 1.0 / reach) / (gap * gap)
+            for i in range(3):
+                force[i] -= size * normal[i]
