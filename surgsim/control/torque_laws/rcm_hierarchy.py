@@ -31,10 +31,20 @@ TERMS = ("tip", "rcm", "joint", "bias", "observer", "limits")
 
 
 @compiled
-def _task_accelerations(
+def task_accelerations(
     gains: Array, seen: Seen, model: Model, late: float, share: float, J: Array, a: Array
 ) -> None:
-    """Fill rows J (m, n) and accelerations a (m,) of tip and RCM at `model`'s state, `late` [s] from now."""
+    """Fill rows J (m, n) and accelerations a (m,) of tip and RCM at `model`'s state, `late` [s] from now.
+
+    Args:
+        gains: Of `HIERARCHY_GAINS` entries, those of the tasks first.
+        seen: Command and trocar.
+        model: The arm's kinematics and motion.
+        late: How long from now `model` is [s].
+        share: Of the bandwidths that is used.
+        J: Filled: tip rows, then those of the RCM.
+        a: Filled: their accelerations [m/s^2], those of the tip alone without a trocar.
+    """
     linear, angular, rate = scratch(3), scratch(3), scratch(3)
     fill_velocity_products(model.Jv_WT, model.z_W, model.v, linear, angular)
     ahead = max(late - gains[SENSOR_DELAY], 0.0)
@@ -62,6 +72,18 @@ def _task_accelerations(
         e_dot = dot(J[3 + i], model.v) - moving[i]
         pull = square * gains[K_RCM] * error[i] + share * gains[D_RCM] * e_dot
         a[3 + i] = dot(normals[i], seen.a_WC) - bias[i] - pull
+
+
+@compiled
+def posture_acceleration(
+    gains: Array, seen: Seen, model: Model, late: float, share: float, out: Array
+) -> None:
+    """Fill `out` (n,) with the acceleration towards the joint reference [rad/s^2]."""
+    ahead = max(late - gains[SENSOR_DELAY], 0.0)
+    for i in range(out.size):
+        gap = seen.q_ref[i] + ahead * seen.qdot_ref[i] - model.q[i]
+        turning = share * gains[D_JOINT] * (seen.qdot_ref[i] - model.v[i])
+        out[i] = share * share * gains[K_JOINT] * gap + turning
 
 
 @compiled
@@ -95,12 +117,8 @@ def fill_terms(
     """Fill the terms of the torque for the state of `model`, which is reached `late` [s] from now."""
     n, m, M = seen.q.size, 3 + seen.rows, model.M
     J, a, posture = scratch_matrix(m, n), scratch(m), scratch(n)
-    _task_accelerations(gains, seen, model, late, share, J, a)
-    ahead = max(late - gains[SENSOR_DELAY], 0.0)
-    for i in range(n):
-        gap = seen.q_ref[i] + ahead * seen.qdot_ref[i] - model.q[i]
-        turning = share * gains[D_JOINT] * (seen.qdot_ref[i] - model.v[i])
-        posture[i] = share * share * gains[K_JOINT] * gap + turning
+    task_accelerations(gains, seen, model, late, share, J, a)
+    posture_acceleration(gains, seen, model, late, share, posture)
     L, Y, A, force = scratch_matrix(n, n), scratch_matrix(m, n), scratch_matrix(m, m), scratch(m)
     L[:], Y[:] = M, J
     if not factor(L):
