@@ -88,3 +88,15 @@ def test_the_pages_of_the_leaderboard_say_what_their_rows_say(suite):
     page = (results.folder / "report.html").read_text(encoding="utf-8")
     assert html.paragraph(told.first, "lead") in page, AGAIN
     assert all(f": {html.escape(one.text)}.</li>" in page for one in told.failing), AGAIN
+
+
+@pytest.mark.parametrize("controller", ["constraint_consistent", "projected_jacobian"])
+def test_a_row_of_the_torque_level_tables_is_what_the_run_gives(made, controller):
+    page = (ROOT / "docs" / "controllers" / "constraint_consistent.md").read_text(encoding="utf-8")
+    level = importlib.import_module("torque_level")
+    for name in level.TABLES:
+        assert page.count(f"<!-- made {name} -->") == 1
+    found = level.measure(level.Job(scenario="rcm_spiral_panda", controller=controller))
+    cells = [found["outcome"], *level.cells(found, level.COLUMNS)]
+    shown = page.split("<!-- made settings_panda -->")[1].split("<!-- end -->")[0]
+    assert f"| spiral | `{controller}` | {' | '.join(cells)} |" in shown

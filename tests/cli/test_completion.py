@@ -19,7 +19,12 @@ NEXT = {
     "run circle_": ["circle_fr3", "circle_iiwa14", "circle_lwr4plus", "circle_panda"],
     "run safety/t": ["safety/tip_limit", "safety/torque_rate_limit"],
     "run circle_panda --co": ["--controller"],
-    "run circle_panda --controller p": ["passive_convex", "pinv", "policy_proportional"],
+    "run circle_panda --controller p": [
+        "passive_convex",
+        "pinv",
+        "policy_proportional",
+        "projected_jacobian",
+    ],
     "run --controller=pi": ["--controller=pinv"],
     "compare qui": ["quick"],
     "compare quick --controllers vprnn,pi": ["vprnn,pinv"],

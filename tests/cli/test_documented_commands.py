@@ -38,6 +38,7 @@ NOT_HERE = {
     "surgsim compare full --engine ray --address 10.0.0.1:6379 --out runs/full": "needs a cluster",
     "python docs/images/controllers.py": DRAWS,
     "python docs/images/controllers.py frontier": DRAWS,
+    "python docs/images/torque_level.py": DRAWS,
     "surgsim bench --only ticks --against benchmarks/ratios.json": "a measurement of the machine",
     "surgsim bench --only ticks --keep benchmarks/ratios.json": "a measurement of the machine",
 }

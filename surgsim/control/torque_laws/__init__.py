@@ -6,10 +6,13 @@ TORQUE_LAWS = Catalog(
     "torque law",
     "surgsim.torque_laws",
     {
+        "constraint_consistent": f"{__name__}.constraint_consistent:ConstraintConsistentConfig",
         "hierarchical_impedance": f"{__name__}.hierarchical_impedance:HierarchicalImpedanceConfig",
         "joint_elastic_dynamics": f"{__name__}.joint_elastic_dynamics:JointElasticDynamicsConfig",
         "joint_impedance": f"{__name__}.joint_impedance:JointImpedanceConfig",
+        "null_space_basis": f"{__name__}.null_space_basis:NullSpaceBasisConfig",
         "policy": f"{__name__}.policy:PolicyLawConfig",
+        "projected_jacobian": f"{__name__}.projected_jacobian:ProjectedJacobianConfig",
         "rcm_elastic_dynamics": f"{__name__}.rcm_elastic_dynamics:RcmElasticDynamicsConfig",
         "rcm_inverse_dynamics": f"{__name__}.rcm_inverse_dynamics:RcmInverseDynamicsConfig",
         "rcm_mpc": f"{__name__}.rcm_mpc:RcmMpcConfig",
