@@ -35,6 +35,11 @@ class Surroundings(Protocol):
         ...
 
     @property
+    def has_drives(self) -> bool:
+        """Whether the arm's joints have motors behind elastic gears."""
+        ...
+
+    @property
     def props(self) -> Sequence[object]:
         """Configs of the props."""
         ...

@@ -17,7 +17,9 @@ as stiff, and the links as light, as they are: nothing of it limits the physics 
     M (v+ - v) / h_s = r + tau_J - D_l (v + v+) / 2
 
 are solved for v+ with one Cholesky factor a step. Dry friction holds a motor that it can hold: tau_f is what
-brings w+ to rest, or, where that is more than the friction is, the friction against the motion.
+brings w+ to rest, or, where that is more than the friction is, the friction against the motion. So it is
+with the links' own dry friction, which is MuJoCo's no longer: a light link on a stiff gear would be thrown
+about by a friction that is found once a physics step (`surgsim.plant.dry_friction`).
 
 The joints b of a shaft that bends are moved as MuJoCo moves them, by the forces r_b on them and with their
 damping D_b in A = M_bb + h D_b. For the arm's joints a, M and r are then M_aa - M_ab A^-1 M_ba and
@@ -40,6 +42,7 @@ from surgsim.models.build import Scene
 from surgsim.models.drive import DriveConfig
 from surgsim.models.robot import joint_names, motor_names
 from surgsim.plant.disturbances.base import copied, spread_factor
+from surgsim.plant.dry_friction import rub
 from surgsim.plant.part import PlantPart
 from surgsim.plant.shaft import bend_joints
 from surgsim.tick.algebra import back_substitute, back_substitute_rows, factor, times
@@ -72,6 +75,7 @@ class Law(Record):
         past_rate: What becomes of a torque that changes too fast.
         at_motor: Whether joints are measured on the motor's side.
         bends: Joints of a shaft that bends, which follow the arm's.
+        rubs: Whether links have dry friction.
         damping: Address of the damping of all joints.
         h: Physics step [s].
         ratio: B / B_s.
@@ -92,6 +96,7 @@ class Law(Record):
     past_rate: int
     at_motor: int
     bends: int
+    rubs: int
     damping: int
     h: float
     ratio: float
@@ -123,12 +128,13 @@ class Account(Record):
 
 LAW, LAW_SIZE = overlay(Law)
 ACCOUNT, ACCOUNT_SIZE = overlay(Account)
-STIFFNESS, GEAR, ROTOR, LOOP, COULOMB, STATIC, VISCOUS, RIPPLE, BIAS, WAVE, LINK_DAMPING = range(11)
-"""Rows of the gains: K, D, B, D_s, friction, ripple, the torque sensor's bias and ripple, links' damping."""
-THETA, OMEGA, MOTOR, COMMAND, OTHERS, FRICTION, MOVED, TAKEN = range(8)
+STIFFNESS, GEAR, ROTOR, LOOP, COULOMB, STATIC, VISCOUS, RIPPLE, BIAS, WAVE, LINK_DAMPING, LINK_DRY = range(12)
+"""Rows of the gains: K, D, B, D_s, friction, ripple, the torque sensor's bias and ripple; then of the links."""
+THETA, OMEGA, MOTOR, COMMAND, OTHERS, FRICTION, MOVED, TAKEN, RUBBED = range(9)
 """Rows of the memory: motor's position and speed, its torque, the command that acts, other forces on the
-links, friction as observed, the links' correction of a step, friction and ripple as they are."""
-_ROWS = 8
+links, friction as observed, the links' correction of a step, friction and ripple as they are, dry friction of
+the links."""
+_ROWS = 9
 """After them the inertia of all joints (nv, nv), the other forces on those of a shaft that bends, and the
 sensed torques and gear speeds of the last substeps (delay + 1, 2, n)."""
 
@@ -303,6 +309,9 @@ def _substep(
         right[i] = momentum[i] + rest[i] - 0.5 * damping[i] * v[i] + K[i] * (theta[i] - x[i])
         right[i] += kappa * (omega[i] - v[i] + push[i] / (beta + kappa))
     times(inverse, right, after)
+    rubbed = _row(memory, ACCOUNT_SIZE, RUBBED, n)
+    if law.rubs:
+        rub(inverse, _row(gains, LAW_SIZE, LINK_DRY, n), rubbed, after)
     for i in range(n):
         beta, kappa = B[i] / hs, 0.25 * K[i] * hs + 0.5 * D[i]
         w = (push[i] + kappa * after[i]) / (beta + kappa)
@@ -311,8 +320,9 @@ def _substep(
         account.work += hs * motor[i] * speed
         account.loss += hs * (taken[i] * speed + D[i] * (speed - link) * (speed - link))
         account.given += hs * torque * link
-        mean[i] += torque - damping[i] * link
-        momentum[i] += rest[i] + torque - damping[i] * link
+        torque -= damping[i] * link + rubbed[i]
+        mean[i] += torque
+        momentum[i] += rest[i] + torque
         known[i] += law.observes * (motor[i] - sensed[i] - beta * (w - omega[i]) - known[i])
         theta[i] += hs * speed
         x[i] += hs * link
@@ -447,14 +457,15 @@ class JointDrives(PlantPart):
 
     def __init__(self, config: DriveConfig, rng: np.random.Generator) -> None:
         self._c, self._rng = config, rng
-        self._n, self._damping = 0, np.zeros(0)
+        self._n, self._damping, self._dry = 0, np.zeros(0), np.zeros(0)
 
     def modify(self, spec: mujoco.MjSpec) -> None:
-        """The motors' inertia and the damping leave MuJoCo's joints, which bear whatever the gears give."""
+        """Motors' inertia, damping and friction leave MuJoCo's joints, which bear whatever the gears give."""
         names = joint_names(spec)
         self._damping = np.array([np.ravel(spec.joint(name).damping)[0] for name in names])
+        self._dry = np.array([spec.joint(name).frictionloss for name in names])
         for name in names:
-            spec.joint(name).armature = 0.0
+            spec.joint(name).armature = spec.joint(name).frictionloss = 0.0
             spec.joint(name).damping = np.zeros_like(spec.joint(name).damping)
         for name in motor_names(len(names)):
             spec.actuator(name).ctrllimited = mujoco.mjtLimited.mjLIMITED_FALSE
@@ -487,6 +498,7 @@ class JointDrives(PlantPart):
             signs * c.each("sensor_bias_nm", n),
             c.each("sensor_ripple_nm", n),
             self._damping,
+            self._dry,
         )
         self.gains = np.concatenate([np.zeros(LAW_SIZE), *rows])
         law = laid_over(Law, self.gains)
@@ -502,7 +514,7 @@ class JointDrives(PlantPart):
         law.rate = drive.torque_rate * dt_s
         cutoff = c.command_cutoff_hz
         law.command_keep = 0.0 if cutoff is None else math.exp(-2.0 * math.pi * cutoff * dt_s)
-        law.bends = bend_joints(scene)
+        law.bends, law.rubs = bend_joints(scene), bool(self._dry.any())
         ring = 2 * (int(law.delay) + 1) * n
         self.memory = np.zeros(ACCOUNT_SIZE + _ROWS * n + scene.model.nv**2 + law.bends + ring)
 

@@ -209,6 +209,11 @@ class Scenario(PartConfig):
         return self.trocar is not None and self.trocar.wall is not None
 
     @property
+    def has_drives(self) -> bool:
+        """Whether the arm's joints have motors behind elastic gears."""
+        return self.robot.drives is not None
+
+    @property
     def scene(self) -> SceneConfig:
         """What is compiled into the MuJoCo model."""
         return SceneConfig(

@@ -230,6 +230,49 @@ def test_dry_friction_holds_a_motor_that_it_can_hold():
     assert arm.column("drive_loss_j")[0] == pytest.approx(2.0 * way, rel=0.02)
 
 
+def test_a_light_link_sticks_and_slips_as_with_a_fine_step():
+    """MuJoCo's own friction, found once a millisecond, threw the wrist about until the run ended."""
+    friction = [{"type": "joint_friction", "coulomb_nm": 0.5}]
+    coarse = run("lwr4plus", disturbances=friction)
+    fine = run("lwr4plus", disturbances=friction, simulation={"timestep_s": 1e-4, "control_period_s": 1e-3})
+    assert coarse.meta.ending.outcome is Outcome.COMPLETED
+    for name in ("q", "joint_torque"):
+        a, b = coarse.block(name), fine.block(name)
+        assert np.abs(a - b).max() < 0.01 * np.ptp(b, axis=0).max()
+    rest = np.abs(coarse.block("v")) < 1e-9
+    assert 0.05 < rest.mean() < 0.95
+
+
+def test_a_link_is_held_that_its_friction_can_hold():
+    """Below it the gear winds up and the link does not move; above it the link goes."""
+    config = drives(**{**BARE, "gear_damping_nm_s_per_rad": 5.0})
+
+    class Dry:
+        def modify(self, spec):
+            spec.joint(joint_names(spec)[1]).frictionloss = 3.0
+
+    part = JointDrives(config, np.random.default_rng(0))
+    scene = SceneConfig(robot=RobotConfig(name="fr3"), theatre=False, timestep_s=1e-3)
+    built = build(scene, [Undamped(), Dry(), part], drawn=False)
+    built.model.opt.gravity[:] = 0.0
+    assert not built.model.dof_frictionloss.any()
+    plant, push = DynamicPlant(built, 0.001, [part]), np.zeros(N)
+    plant.reset(POSE)
+    for torque, moves in ((1.4, False), (4.5, True)):  # the gear swings to twice the torque
+        push[1] = torque
+        before = plant.data.qpos[1]
+        for _ in range(300):
+            plant.step(push, np.zeros(N))
+        moved = plant.data.qpos[1] - before
+        assert moved > 1e-3 if moves else abs(moved) < 1e-12
+
+
+def test_friction_that_is_greater_at_rest_belongs_to_the_motors():
+    friction = [{"type": "joint_friction", "coulomb_nm": 0.5, "static_nm": 0.8}]
+    with pytest.raises(surgsim.SurgsimError, match=r"give robot\.drive\.static_nm"):
+        run(disturbances=friction)
+
+
 def test_the_torque_loop_divides_inertia():
     """On held links the gears' torques answer a step as K / (B_s s^2 + D_s s + K) does, B_s = B / 4."""
     arm = Alone(drives(inertia_shaping=4.0, loop_cutoff_hz=1e5, loop_delay_s=0.0, coulomb_nm=0.0))

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, NonNegativeFloat, model_validator
 
+from surgsim.catalog import Surroundings
 from surgsim.models.build import Scene, span
 from surgsim.models.robot import joint_names
 from surgsim.plant.disturbances.base import Disturbance, DisturbanceConfig, Spread, copied, spread_factor
@@ -16,6 +17,8 @@ Array = NDArray[np.float64]
 
 class JointFrictionConfig(DisturbanceConfig):
     """Coulomb, viscous and, if wanted, Stribeck friction of every joint.
+
+    On real drives it is that of the links, in their bearings; the motors have their own (`robot.drive`).
 
     Attributes:
         coulomb_nm: Dry friction torque of each joint [N m].
@@ -42,6 +45,14 @@ class JointFrictionConfig(DisturbanceConfig):
                 f"{self.coulomb_nm:g}, and that above 0"
             )
         return self
+
+    def check(self, scenario: Surroundings) -> None:
+        """Refuse links of real drives that hold better at rest: that friction is in the motors."""
+        if self.static_nm is not None and scenario.has_drives:
+            raise ValueError(
+                "joint_friction: static_nm is for ideal drives; on real ones friction that is greater at rest is "
+                "that of the motors: give robot.drive.static_nm"
+            )
 
     def build(self, rng: np.random.Generator) -> "JointFriction | StribeckFriction":
         """The disturbance, which draws each joint's friction."""
