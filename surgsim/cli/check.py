@@ -38,6 +38,7 @@ def execute(options: argparse.Namespace) -> int:
                 name, controller=options.controller, assignments=options.assignments, seed=options.seed
             )
             setup = prepare(scenario)
+            setup.controller.close()
         except SurgsimError as error:
             print_error(naming_file(name, error))
             wrong += 1

@@ -6,6 +6,7 @@ RESOLVERS = Catalog(
     "resolver",
     "surgsim.resolvers",
     {
+        "external": "surgsim.control.resolvers.external:ExternalConfig",
         "gradient": "surgsim.control.resolvers.gradient:GradientConfig",
         "mink": "surgsim.control.resolvers.mink:MinkConfig",
         "passive_qp": "surgsim.control.resolvers.passive_qp:PassiveQpConfig",

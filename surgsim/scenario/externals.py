@@ -1,0 +1,35 @@
+"""The user's own file of commands of external controllers: `surgsim/external.yaml` in the folder of configurations.
+
+That folder is `$XDG_CONFIG_HOME`, or `~/.config`. No scenario holds a command: whoever runs another's scenario
+runs no program of theirs.
+"""
+
+import os
+from pathlib import Path
+
+from surgsim.control.external.given import parse_given
+from surgsim.errors import SurgsimError
+from surgsim.scenario.yaml_text import read_yaml
+
+
+def config_file() -> Path:
+    """Where the file would be."""
+    given = os.environ.get("XDG_CONFIG_HOME", "")
+    folder = Path(given) if os.path.isabs(given) else Path("~/.config").expanduser()
+    return folder / "surgsim" / "external.yaml"
+
+
+def configured() -> dict[str, str]:
+    """Commands by name, of the user's own file; none where there is no such file.
+
+    Raises:
+        SurgsimError: If the file is no mapping of names to commands.
+    """
+    file = config_file()
+    if not file.is_file():
+        return {}
+    tree = read_yaml(file).tree
+    for name, command in tree.items():
+        if not isinstance(command, str):
+            raise SurgsimError(f"{file}: {name}: {str(command)[:60]!r} is no command: write NAME: COMMAND")
+    return parse_given((f"{name}={command}" for name, command in tree.items()), str(file))
