@@ -4,8 +4,9 @@ import argparse
 
 KINDS = ("header", "layout")
 HELP = "print what is exchanged with a controller outside surgsim"
-EXAMPLES = """A controller of your own, a process or a C function, is asked at every tick. The header is for C and
-C++, with a loop that serves a process; the layout is JSON, with every field's offset, for other languages.
+EXAMPLES = """A controller of your own, a process or a C function, is asked at every tick. The header is for C
+and C++, with a loop that serves a process; the layout is JSON, with every field's offset, for other
+languages.
 
 examples:
   surgsim external header > surgsim_external.h

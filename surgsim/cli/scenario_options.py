@@ -41,7 +41,7 @@ def add_external(parser: argparse.ArgumentParser) -> None:
 
 @contextmanager
 def externals_given(options: argparse.Namespace) -> Iterator[None]:
-    """Within the block, external controllers have the commands of the command line and of the user's own file.
+    """Within the block, external controllers have the commands of command line and user's own file.
 
     Raises:
         SurgsimError: If a command cannot be read.

@@ -83,7 +83,7 @@ def is_compiled(part: Any) -> bool:
 
 
 def has_state_in_python(part: Any) -> bool:
-    """Whether the part is a Python object, or a kernel that enters one, or asks one that remembers by itself."""
+    """Whether the part is a Python object, or a kernel that enters one, or what it asks remembers."""
     outside: Any = getattr(part, "outside", None)
     remembers = outside is not None and outside.has_state
     return not hasattr(part, "kernel") or getattr(part, "inside", None) is not None or remembers

@@ -1,7 +1,7 @@
-"""The nominal arm as text for other libraries: MJCF and URDF, written from the compiled model to the last bit.
+"""The nominal arm as text for other libraries: MJCF and URDF, of the compiled model to the last bit.
 
-Both hold the bodies, joints, limits and inertias and the frame of the tip, and nothing to be looked at: no file
-beside them is needed. World frame: that of the scene.
+Both hold the bodies, joints, limits and inertias and the frame of the tip, and nothing to be looked at: no
+file beside them is needed. World frame: that of the scene.
 """
 
 from collections.abc import Mapping

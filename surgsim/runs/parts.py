@@ -48,7 +48,7 @@ def policies_of(scenario: Scenario) -> dict[str, str | None]:
 
 
 def externals_of(scenario: Scenario) -> dict[str, dict[str, str] | None]:
-    """Name and version that each external controller of `scenario` declares; None for one that declares nothing.
+    """Name and version that each external controller of `scenario` declares; None if it declares nothing.
 
     One that this process has not asked yet is started and asked.
     """

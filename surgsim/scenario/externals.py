@@ -1,7 +1,7 @@
-"""The user's own file of commands of external controllers: `surgsim/external.yaml` in the folder of configurations.
+"""The user's own file of commands of external controllers: `surgsim/external.yaml`.
 
-That folder is `$XDG_CONFIG_HOME`, or `~/.config`. No scenario holds a command: whoever runs another's scenario
-runs no program of theirs.
+It is in `$XDG_CONFIG_HOME`, or `~/.config`. No scenario holds a command: whoever runs another's
+scenario runs no program of theirs.
 """
 
 import os

@@ -44,7 +44,9 @@ def test_mujoco_makes_the_same_arm_of_the_mjcf(one):
 
 def test_the_urdf_has_the_same_tip_masses_and_gravity_but_no_armature(one):
     marked = urdf_of(one, {"there": np.array([0.1, 0.2, 0.3])})
-    text = marked.replace('<robot name="arm">', '<robot name="arm"><mujoco><compiler fusestatic="false"/></mujoco>')
+    text = marked.replace(
+        '<robot name="arm">', '<robot name="arm"><mujoco><compiler fusestatic="false"/></mujoco>'
+    )
     model = mujoco.MjModel.from_xml_string(text)
     assert model.nv == one.limits.q_min.size
     np.testing.assert_allclose(model.jnt_range[:, 0], one.limits.q_min, rtol=1e-15)

@@ -1,15 +1,15 @@
-/* What surgsim and an external controller exchange. Made by `surgsim external header`: do not edit it.
+/* What surgsim and an external controller exchange. Made by `surgsim external header`.
  *
- * A process reads a surgsim_hello and text_bytes of JSON from its standard input and writes a surgsim_declaration to
- * its standard output; then it reads requests and writes one reply to each, until its input ends. A function of a
- * shared library, named f here, is
+ * A process reads a surgsim_hello and text_bytes of JSON from its standard input and writes a
+ * surgsim_declaration to its standard output; then it reads requests and writes one reply to each, until its
+ * input ends. A function of a shared library, named f here, is
  *
  *     int64_t f_declare(const surgsim_hello *hello, const char *text, surgsim_declaration *declaration);
  *     int64_t f(const surgsim_request *request, double *memory, double *answer);
  *
- * The first fills the declaration and returns 0, the second fills answer[0..n-1] and returns 0, or 1 where there is
- * no command. `memory` holds as many doubles as it declared, all 0 where request->first is 1; it keeps nothing
- * elsewhere. Arrays over joints have room for SURGSIM_MOST_JOINTS, whatever the arm has: the arm's n come first.
+ * The first fills the declaration and returns 0. The second fills answer[0..n-1] and returns 0, or 1 where there
+ * is no command. `memory` holds as many doubles as it declared, all 0 where request->first is 1; it keeps
+ * nothing elsewhere. Arrays over joints have room for SURGSIM_MOST_JOINTS, whatever the arm has: the arm's n come first.
  * SI units; frames W world, T tip, C trocar; matrices row by row. Numbers are little-endian, without gaps.
  */
 #ifndef SURGSIM_EXTERNAL_H
@@ -145,7 +145,8 @@ static inline int surgsim_write(int file, const void *from, size_t bytes) {
 }
 
 /* The declaration of a controller of that name and version, which wants so many doubles of memory. */
-static inline void surgsim_declare(surgsim_declaration *d, const char *name, const char *release, int64_t memory) {
+static inline void surgsim_declare(surgsim_declaration *d, const char *name, const char *release,
+                                   int64_t memory) {
     memset(d, 0, sizeof *d);
     d->magic = SURGSIM_DECLARATION, d->version = SURGSIM_VERSION, d->hash = SURGSIM_HASH, d->memory = memory;
     strncpy(d->name, name, sizeof d->name - 1);

@@ -1,4 +1,4 @@
-"""C functions for the exchange with an external controller: of the system by name, the controller's by address."""
+"""C functions for the exchange: the system's by their names, an external controller's by its address."""
 
 import ctypes
 import time
@@ -58,7 +58,7 @@ def _call_c(context: Any, address: Any, request: Any, memory: Any, answer: Any) 
 
 
 def call_c(address: int, request: int, memory: int, answer: int) -> int:
-    """What the controller's function at `address` returns, given the addresses of what it reads and writes."""
+    """What the function at `address` returns, given the addresses of what it reads and writes."""
     return int(_FUNCTION(int(address))(int(request), int(memory), int(answer)))
 
 

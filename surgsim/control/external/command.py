@@ -40,7 +40,9 @@ def read_command(name: str, text: str) -> Program | Function:
     try:
         words = shlex.split(text)
     except ValueError as error:
-        raise SurgsimError(f"external controller '{name}': the command {text!r} cannot be read: {error}") from error
+        raise SurgsimError(
+            f"external controller '{name}': the command {text!r} cannot be read: {error}"
+        ) from error
     if not words:
         raise SurgsimError(f"external controller '{name}': its command is empty")
     return Program(words=(os.path.expanduser(words[0]), *words[1:]))

@@ -1,4 +1,4 @@
-"""What external controllers say of themselves, read from a declaration and remembered for a run's provenance."""
+"""What external controllers say of themselves, remembered for a run's provenance."""
 
 from dataclasses import dataclass
 
@@ -51,11 +51,13 @@ def read_declaration(content: bytes, who: str) -> Declared:
         raise SurgsimError(f"{who} speaks version {told['version']} of the protocol, not {VERSION}")
     if told["hash"] != layout_hash():
         raise SurgsimError(
-            f"{who} was made for another layout of the messages, {int(told['hash']):#x} not {layout_hash():#x}: "
+            f"{who} was made for another layout of messages, {int(told['hash']):#x} not {layout_hash():#x}: "
             "compile it with the header of `surgsim external header`"
         )
     if not 0 <= told["memory"] <= MOST_MEMORY:
-        raise SurgsimError(f"{who} wants {told['memory']} doubles of memory; at most {MOST_MEMORY} are allowed")
+        raise SurgsimError(
+            f"{who} wants {told['memory']} doubles of memory; at most {MOST_MEMORY} are allowed"
+        )
     name, release = (_text(bytes(told[key]), key, who) for key in ("name", "release"))
     return Declared(name=name, release=release, memory=int(told["memory"]))
 

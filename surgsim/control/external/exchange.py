@@ -1,8 +1,8 @@
 """The exchange of a tick with an external controller, as a kernel: no Python is entered.
 
-The request is filled from what a part sees, word by word, and given to the controller: a function by its address,
-a process through a pipe. A process that does not answer, or answers what is no answer, leaves a reason in the
-`Post`, whose words are in `surgsim.control.external.reasons`.
+The request is filled from what a part sees, word by word, and given to the controller: a function by its
+address, a process through a pipe. A process that does not answer, or answers what is no answer, leaves a
+reason in the `Post`, whose words are in `surgsim.control.external.reasons`.
 """
 
 import math
@@ -122,7 +122,7 @@ def _ask(post: Post, report: NDArray[np.int64]) -> int:
         return CLOSED
     until, wait_s, got = monotonic() + post.timeout_s, post.timeout_s, 0
     while got < post.reply_bytes:
-        if sys_poll(post.files, 1, int(math.ceil(1e3 * wait_s))) == _READY:
+        if sys_poll(post.files, 1, math.ceil(1e3 * wait_s)) == _READY:
             count = sys_read(files[2], post.reply + got, post.reply_bytes + 8 - got)
             if count <= 0:
                 return CLOSED

@@ -1,4 +1,4 @@
-"""Which command stands for the name of an external controller: given for a block of code, never by a scenario."""
+"""Which command stands for an external controller's name: given for a block, never by a scenario."""
 
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
@@ -35,7 +35,9 @@ def command_for(name: str) -> str:
     commands = _given.get()
     if name in commands:
         return commands[name]
-    how = f"give --external {name}=COMMAND, or the line '{name}: COMMAND' in surgsim/external.yaml of ~/.config"
+    how = (
+        f"give --external {name}=COMMAND, or the line '{name}: COMMAND' in surgsim/external.yaml of ~/.config"
+    )
     known = f" {unknown_name(name, 'given one', commands)}" if commands else ""
     raise SurgsimError(f"external controller '{name}' has no command: {how}.{known}")
 

@@ -1,9 +1,9 @@
 """What surgsim and an external controller exchange, generated from the records of a tick.
 
-The request of a tick is the record `Seen` of `surgsim.tick.arrays` with room for `MOST_JOINTS` joints, whatever the
-arm has: so there is one layout for all arms. Its fields, their order and their words are those of that class: a field
-that a controller's part gets there, an external controller gets too. All numbers are little-endian, of 8 bytes,
-without gaps.
+The request of a tick is the record `Seen` of `surgsim.tick.arrays` with room for `MOST_JOINTS` joints,
+whatever the arm has: so there is one layout for all arms. Its fields, their order and their words are those
+of that class: a field that a controller's part gets there, an external controller gets too. All numbers are
+little-endian, of 8 bytes, without gaps.
 """
 
 import hashlib

@@ -15,9 +15,8 @@ class Library:
     """A loaded function and its declaration.
 
     Args:
-        who: What messages call it.
-        file: The shared library.
-        name: The function `int64_t name(const surgsim_request *, double *memory, double *answer)`; beside it must
+        who: What messages call it. file: The shared library. name: The function `int64_t name(const
+        surgsim_request *, double *memory, double *answer)`; beside it must
             be `int64_t name_declare(const surgsim_hello *, const char *text, surgsim_declaration *)`.
 
     Raises:
@@ -33,7 +32,9 @@ class Library:
         try:
             self._function, self._declare = (getattr(self._loaded, each) for each in (name, name + DECLARE))
         except AttributeError as error:
-            raise SurgsimError(f"{who}: {file} needs the functions {name} and {name}{DECLARE}: {error}") from error
+            raise SurgsimError(
+                f"{who}: {file} needs the functions {name} and {name}{DECLARE}: {error}"
+            ) from error
 
     @property
     def address(self) -> int:

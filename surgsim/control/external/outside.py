@@ -5,20 +5,10 @@ from typing import Any, NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
+from surgsim.control.external import exchange
 from surgsim.control.external.command import Function, read_command
-from surgsim.control.external.declared import Declared, remember
-from surgsim.control.external.exchange import (
-    CLOSED,
-    FOREIGN,
-    LATE,
-    NOT_FINITE,
-    OWN_MEMORY,
-    POST_SIZE,
-    SILENT,
-    STATUS,
-    TOO_LONG,
-    Post,
-)
+from surgsim.control.external.declared import remember
+from surgsim.control.external.exchange import CLOSED, OWN_MEMORY, POST_SIZE, Post
 from surgsim.control.external.given import command_for
 from surgsim.control.external.greeting import greeting
 from surgsim.control.external.layout import JOINT_VELOCITY, REQUEST, reply, request, runs
@@ -101,22 +91,31 @@ class Outside:
     def reason(self, seen: Seen) -> str:
         """Why there was no answer, for the person who reads the outcome; a process is ended."""
         why, more = (int(word) for word in self._report)
-        at = f"at {float(seen.t_s):.3f} s"
-        if why == CLOSED:
-            assert self._process is not None
-            self._files[:] = -1
+        at, process = f"at {float(seen.t_s):.3f} s", self._process
+        if why == CLOSED and process is not None:
             part = f" after {more} of {self._post.reply_bytes} bytes of an answer" if more else ""
-            return f"{self._who} {self._process.ended()}{part} {at}{self._process.last_words}"
-        text = {
-            SILENT: f"did not answer within {float(self._post.timeout_s):g} s {at}{self._what_came(more)}",
-            TOO_LONG: f"answered with more than {self._post.reply_bytes} bytes {at}",
-            FOREIGN: f"gave what is no answer {at}{self._what_came(more)}",
-            LATE: f"answered the request {int(self._words[1])}, not {int(self._request['tick'][0])}, {at}",
-            STATUS: f"gave the status {more} {at}: 0 is an answer, 1 says that there is no command",
-            NOT_FINITE: f"gave {float(self._answer[more])} {self._unit} for joint {more + 1} {at}",
-        }.get(why, f"gave no answer {at}")
+            text = f"{process.ended()}{part} {at}"
+        else:
+            text = self._deed(why, more, at)
         self.kill()
-        return f"{self._who} {text}{self._process.last_words if self._process else ''}"
+        return f"{self._who} {text}{process.last_words if process else ''}"
+
+    def _deed(self, why: int, more: int, at: str) -> str:
+        """What it did, where it did not end by itself; `more` as in its report."""
+        match why:
+            case exchange.SILENT:
+                return f"did not answer within {float(self._post.timeout_s):g} s {at}{self._what_came(more)}"
+            case exchange.TOO_LONG:
+                return f"answered with more than {self._post.reply_bytes} bytes {at}"
+            case exchange.FOREIGN:
+                return f"gave what is no answer {at}{self._what_came(more)}"
+            case exchange.LATE:
+                return f"answered the request {self._words[1]}, not {self._request['tick'][0]}, {at}"
+            case exchange.STATUS:
+                return f"gave the status {more} {at}: 0 is an answer, 1 says that there is no command"
+            case exchange.NOT_FINITE:
+                return f"gave {float(self._answer[more])} {self._unit} for joint {more + 1} {at}"
+        return f"gave no answer {at}"
 
     @property
     def _words(self) -> NDArray[np.int64]:
@@ -147,5 +146,3 @@ class Outside:
 
     def __reduce__(self) -> NoReturn:
         raise TypeError(f"what {self._who} remembers is in a process of its own")
-
-

@@ -1,8 +1,8 @@
 """A controller in a process of its own: how it is started, what is heard of it, and how it ends.
 
-It reads requests from its standard input and writes replies to its standard output; what it writes to standard
-error is kept for the message of a failure. It is the first of a session of its own, so that Ctrl-C in a terminal
-does not reach it before surgsim has ended it, and so that whatever it started ends with it.
+It reads requests from its standard input and writes replies to its standard output; what it writes to
+standard error is kept for the message of a failure. It is the first of a session of its own, so that Ctrl-C
+in a terminal does not reach it before surgsim has ended it, and so that whatever it started ends with it.
 """
 
 import contextlib
@@ -55,7 +55,7 @@ class Process:
         self._chunks: deque[bytes] = deque(maxlen=_KEPT)
         self._hearing = threading.Thread(target=_hear, args=(self._popen, self._chunks), daemon=True)
         self._hearing.start()
-        self._end = weakref.finalize(self, _end, self._popen, _GRACE_S)
+        self._end = weakref.finalize(self, _end, self._popen, self._hearing, _GRACE_S)
 
     @property
     def files(self) -> tuple[int, int]:
@@ -77,7 +77,7 @@ class Process:
             raise
 
     def _exchange(self, content: bytes, timeout_s: float) -> bytes:
-        """Write all of `content`, and read a declaration meanwhile: a text may be longer than a pipe holds."""
+        """Write all of `content`, and read a declaration meanwhile: a text may be more than a pipe holds."""
         ask, answer = self.files
         until, size, got = time.monotonic() + timeout_s, declaration().dtype.itemsize, b""
         os.set_blocking(ask, False)
@@ -96,7 +96,9 @@ class Process:
             if readable:
                 more = os.read(answer, size - len(got))
                 if not more:
-                    raise SurgsimError(f"{self._who} {self.ended()} before it declared itself{self.last_words}")
+                    raise SurgsimError(
+                        f"{self._who} {self.ended()} before it declared itself{self.last_words}"
+                    )
                 got += more
         os.set_blocking(ask, True)
         return got
@@ -114,7 +116,7 @@ class Process:
 
     @property
     def last_words(self) -> str:
-        """The end of what it wrote to standard error, to be put behind a sentence; empty if it wrote nothing."""
+        """The end of what it wrote to standard error, to be put behind a sentence; or nothing."""
         self._hearing.join(0.05)
         text = " ".join(b"".join(tuple(self._chunks)).decode(errors="replace").split())
         shown = text if len(text) <= _LAST_WORDS else f"...{text[-_LAST_WORDS:]}"
@@ -123,7 +125,7 @@ class Process:
     def kill(self) -> None:
         """End it at once."""
         if self._end.detach() is not None:
-            _end(self._popen, 0.0)
+            _end(self._popen, self._hearing, 0.0)
 
     def close(self) -> None:
         """End it in order: its standard input ends, it has a second, and is killed if that is not enough."""
@@ -138,8 +140,8 @@ def _hear(popen: "subprocess.Popen[bytes]", chunks: deque[bytes]) -> None:
             chunks.append(chunk)
 
 
-def _end(popen: "subprocess.Popen[bytes]", grace_s: float) -> None:
-    """End a process and whatever it started, and leave no zombie."""
+def _end(popen: "subprocess.Popen[bytes]", hearing: threading.Thread, grace_s: float) -> None:
+    """End a process and whatever it started, and leave neither a zombie nor an open file."""
     for file in (popen.stdin, popen.stdout):
         assert file is not None
         with contextlib.suppress(OSError):
@@ -150,6 +152,7 @@ def _end(popen: "subprocess.Popen[bytes]", grace_s: float) -> None:
         with contextlib.suppress(OSError):
             os.killpg(popen.pid, signal.SIGKILL)  # before it is reaped: the number is still its own
         popen.wait()
+        hearing.join(_GRACE_S)
 
 
 def _has_ended(pid: int, within_s: float) -> bool:

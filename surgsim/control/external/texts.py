@@ -22,18 +22,18 @@ from surgsim.tick.arrays import MOST_JOINTS
 
 _WIDTH = 110
 _TYPES = {"f8": "double", "i8": "int64_t", f"S{TEXT}": "char"}
-_ABOUT = """What surgsim and an external controller exchange. Made by `surgsim external header`: do not edit it.
+_ABOUT = """What surgsim and an external controller exchange. Made by `surgsim external header`.
 
-A process reads a surgsim_hello and text_bytes of JSON from its standard input and writes a surgsim_declaration to
-its standard output; then it reads requests and writes one reply to each, until its input ends. A function of a
-shared library, named f here, is
+A process reads a surgsim_hello and text_bytes of JSON from its standard input and writes a
+surgsim_declaration to its standard output; then it reads requests and writes one reply to each, until its
+input ends. A function of a shared library, named f here, is
 
     int64_t f_declare(const surgsim_hello *hello, const char *text, surgsim_declaration *declaration);
     int64_t f(const surgsim_request *request, double *memory, double *answer);
 
-The first fills the declaration and returns 0, the second fills answer[0..n-1] and returns 0, or 1 where there is
-no command. `memory` holds as many doubles as it declared, all 0 where request->first is 1; it keeps nothing
-elsewhere. Arrays over joints have room for SURGSIM_MOST_JOINTS, whatever the arm has: the arm's n come first.
+The first fills the declaration and returns 0. The second fills answer[0..n-1] and returns 0, or 1 where there
+is no command. `memory` holds as many doubles as it declared, all 0 where request->first is 1; it keeps
+nothing elsewhere. Arrays over joints have room for SURGSIM_MOST_JOINTS, whatever the arm has: the arm's n come first.
 SI units; frames W world, T tip, C trocar; matrices row by row. Numbers are little-endian, without gaps."""
 _READ = """
 /* Read or write all of `bytes`; 0, or -1 where the other end is closed. */
@@ -56,7 +56,8 @@ static inline int surgsim_write(int file, const void *from, size_t bytes) {
 }
 
 /* The declaration of a controller of that name and version, which wants so many doubles of memory. */
-static inline void surgsim_declare(surgsim_declaration *d, const char *name, const char *release, int64_t memory) {
+static inline void surgsim_declare(surgsim_declaration *d, const char *name, const char *release,
+                                   int64_t memory) {
     memset(d, 0, sizeof *d);
     d->magic = SURGSIM_DECLARATION, d->version = SURGSIM_VERSION, d->hash = SURGSIM_HASH, d->memory = memory;
     strncpy(d->name, name, sizeof d->name - 1);
@@ -103,7 +104,13 @@ def header_text() -> str:
         "JOINT_VELOCITY": JOINT_VELOCITY,
         "JOINT_TORQUE": JOINT_TORQUE,
     }
-    words = {"HASH": layout_hash(), "HELLO": HELLO, "DECLARATION": DECLARATION, "REQUEST": REQUEST, "REPLY": REPLY}
+    words = {
+        "HASH": layout_hash(),
+        "HELLO": HELLO,
+        "DECLARATION": DECLARATION,
+        "REQUEST": REQUEST,
+        "REPLY": REPLY,
+    }
     lines = [
         *_comment(_ABOUT),
         "#ifndef SURGSIM_EXTERNAL_H",
@@ -119,7 +126,7 @@ def header_text() -> str:
     for message in messages():
         lines += ["", *_struct(message)]
     sizes = [
-        f"_Static_assert(sizeof(surgsim_{message.name}) == {message.dtype.itemsize}, \"no gaps\");"
+        f'_Static_assert(sizeof(surgsim_{message.name}) == {message.dtype.itemsize}, "no gaps");'
         for message in messages()
     ]
     return "\n".join([*lines, "", "#ifndef __cplusplus", *sizes, "#endif", _READ, "#endif", ""])
