@@ -3,9 +3,10 @@
 import sys
 from pathlib import Path
 
-import numpy as np
-
 sys.path.insert(0, str(Path(__file__).parent / "python"))
+from surgsim_external import serve
+
+__all__ = ["K_PER_S", "next_target", "rcm_reached", "serve", "trocar_in_tip"]
 
 K_PER_S = 5.0
 """Gain of the feedback of tip and shaft, as surgsim's own resolvers have it."""
@@ -25,10 +26,3 @@ def next_target(seen):
 def rcm_reached(seen):
     """Which part of the RCM's error is to go in a period: what K_PER_S takes away in that time."""
     return K_PER_S * float(seen["dt_s"])
-
-
-def across(z):
-    """Two unit vectors across `z` (3,) as rows (2, 3)."""
-    first = np.cross(z, np.eye(3)[np.argmin(np.abs(z))])
-    first /= np.linalg.norm(first)
-    return np.array([first, np.cross(z, first)])

@@ -4,7 +4,6 @@ import json
 from pathlib import Path
 
 import outside
-import pytest
 from batches import Here, short_run
 
 from surgsim.cli.main import main
@@ -15,11 +14,6 @@ from surgsim.compare.workers import run_jobs
 from surgsim.control.external.given import giving
 from surgsim.runs.parts import externals_of
 from surgsim.scenario.load import load_scenario
-
-
-@pytest.fixture(autouse=True)
-def _no_file_of_the_user(tmp_path, monkeypatch):
-    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "nowhere"))
 
 
 def summary(folder):
@@ -69,25 +63,18 @@ def test_results_say_which_it_was_and_another_version_is_run_again(tmp_path, cap
     assert "1 of 1 runs were made by other code (external controller mine) and are run again" in said
 
 
-BATCH = ["compare", "circle_lwr4plus", "--controllers", "external_velocity,pinv"]
+NAMELESS = ["--set", "controller.resolver.name=nobody"]
 
 
 def test_without_a_command_nothing_is_begun(tmp_path, capsys):
-    assert main([*BATCH, "--out", str(tmp_path / "out")]) == 2
+    batch = ["compare", "circle_lwr4plus", "--controllers", "external_velocity", *NAMELESS]
+    assert main([*batch, "--out", str(tmp_path / "out")]) == 2
     assert capsys.readouterr().err.startswith(
-        "surgsim: external controller 'mine' has no command: give --external mine=COMMAND, or the line"
+        "surgsim: external controller 'nobody' has no command: give --external nobody=COMMAND, or the line"
     )
     assert not (tmp_path / "out").exists()
-    tune = [
-        "tune",
-        "external_velocity",
-        "--scenario",
-        "circle_lwr4plus",
-        "--budget",
-        "9",
-        "--out",
-        str(tmp_path / "t"),
-    ]
+    on = ["--scenario", "circle_lwr4plus", "--budget", "9", "--out", str(tmp_path / "t")]
+    tune = ["tune", "external_velocity", *on, *NAMELESS]
     assert main(tune) == 2
     assert "has no command" in capsys.readouterr().err
 

@@ -266,6 +266,7 @@ def test_the_full_suite_leaves_nothing_out():
         "joint_elastic_dynamics",
         "joint_impedance_tuned",
     }  # for real drives
+    elsewhere |= {"external_torque", "external_velocity"}  # these need a program
     assert set(suite.controllers) == set(shipped("controllers")) - elsewhere
     assert len(expand(suite, folder)) == 3600
     assert len(expand(*load_suite("seeds"))) == 240

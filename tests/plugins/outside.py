@@ -1,9 +1,9 @@
 """A controller in a process of its own, in Python alone so that it starts at once; it fails as it is told.
 
 As velocities it gives what the resolver `pinv` gives, in the same order of operations, so to the same bit; as
-torques a spring and a damper that leave an arm alone which is where it should be, or nothing but damping. The
-first argument is how it fails, the second at which request of a run, counted from 1, the third a seed, the
-fourth its version. `gives_up` is no failure of the process: it says once that there is no command.
+torques it makes the joints follow their reference. The first argument is how it fails, the second at which
+request of a run, counted from 1, the third a seed, the fourth its version. `gives_up` is no failure of the
+process: it says once that there is no command.
 """
 
 import json
@@ -81,12 +81,16 @@ def pinv(seen):
     return answer
 
 
-def damped(seen):
-    """tau = J_T^T K (p_d - p) - D q'."""
-    pull = [500.0 * (seen["p_WTd"][i] - seen["p_WT"][i]) for i in range(3)]
+def following(seen):
+    """tau = M (w^2 (q_ref - q) + 2 w (q_ref' - q')) + D q_ref'."""
+    n, w = seen["n"], 60.0
+    wanted = [
+        w * w * (seen["q_ref"][j] - seen["q"][j]) + 2.0 * w * (seen["qdot_ref"][j] - seen["v"][j])
+        for j in range(n)
+    ]
     return [
-        sum(seen["Jv_WT"][8 * i + j] * pull[i] for i in range(3)) - 2.0 * seen["v"][j]
-        for j in range(seen["n"])
+        sum(seen["M"][8 * i + j] * wanted[j] for j in range(n)) + seen["damping"][i] * seen["qdot_ref"][i]
+        for i in range(n)
     ]
 
 
@@ -101,7 +105,7 @@ def serve(fails, at, seed, release):
     assert len(json.loads(text)["joints"]) == hello[5]
     told = (messages["declaration"]["magic"], layout["version"], layout["hash"], 0)
     os.write(1, struct.pack("<4q64s64s", *told, NAME.encode(), release.encode()))
-    answer = pinv if hello[6] == layout["gives"]["joint_velocity"] else damped
+    answer = pinv if hello[6] == layout["gives"]["joint_velocity"] else following
     size, draws = messages["request"]["bytes"], random.Random(seed)
     while len(content := os.read(0, size)) == size:
         seen = unpacked(content, messages["request"]["fields"])

@@ -19,7 +19,7 @@ from surgsim.tick.arrays import Seen, layout
 from surgsim.tick.overlay import laid_over
 
 Array = NDArray[np.float64]
-_POLLIN = 1
+_POLLIN, _SHOWN = 1, 16
 
 
 class Outside:
@@ -129,7 +129,7 @@ class Outside:
         """The beginning of what came in place of an answer."""
         if count == 0:
             return ""
-        beginning = self._reply.tobytes()[: min(count, 40)]
+        beginning = self._reply.tobytes()[: min(count, _SHOWN)]
         return f": {count} of {self._post.reply_bytes} bytes came, beginning with {beginning!r}"
 
     def kill(self) -> None:

@@ -33,7 +33,7 @@ input ends. A function of a shared library, named f here, is
 
 The first fills the declaration and returns 0. The second fills answer[0..n-1] and returns 0, or 1 where there
 is no command. `memory` holds as many doubles as it declared, all 0 where request->first is 1; it keeps
-nothing elsewhere. Arrays over joints have room for SURGSIM_MOST_JOINTS, whatever the arm has: the arm's n come first.
+nothing elsewhere. Arrays over joints have room for SURGSIM_MOST_JOINTS: the arm's n come first.
 SI units; frames W world, T tip, C trocar; matrices row by row. Numbers are little-endian, without gaps."""
 _READ = """
 /* Read or write all of `bytes`; 0, or -1 where the other end is closed. */
