@@ -21,11 +21,13 @@ from surgsim.tick.views import vector, words
 
 Array = NDArray[np.float64]
 
-FINE, SILENT, CLOSED, TOO_LONG, FOREIGN, LATE, STATUS, NOT_FINITE = range(8)
+FINE, SILENT, CLOSED, TOO_LONG, FOREIGN, LATE, STATUS, NOT_FINITE, INTERRUPTED = range(9)
 """Why there is no answer, `Report.reason`."""
 TICK, FIRST = 1, 3
 """Words of a request."""
 _HEAD, _READY = 3, 1
+AFTER_SIGNAL_S = 0.1
+"""How long an answer may still take after a signal: Ctrl-C is Python's, which is not entered before [s]."""
 
 
 class Post(Record):
@@ -120,18 +122,21 @@ def _ask(post: Post, report: NDArray[np.int64]) -> int:
     files = words(post.files, 3)
     if sys_write(files[1], post.request, post.request_bytes) != post.request_bytes:
         return CLOSED
-    until, wait_s, got = monotonic() + post.timeout_s, post.timeout_s, 0
+    until, wait_s, got, silent = monotonic() + post.timeout_s, post.timeout_s, 0, SILENT
     while got < post.reply_bytes:
-        if sys_poll(post.files, 1, math.ceil(1e3 * wait_s)) == _READY:
+        ready = sys_poll(post.files, 1, math.ceil(1e3 * wait_s))
+        if ready == _READY:
             count = sys_read(files[2], post.reply + got, post.reply_bytes + 8 - got)
             if count <= 0:
                 return CLOSED
             got += count
             report[1] = got
+        elif ready < 0 and silent == SILENT:
+            until, silent = min(until, monotonic() + AFTER_SIGNAL_S), INTERRUPTED
         if got < post.reply_bytes:
             wait_s = until - monotonic()
             if wait_s <= 0.0:
-                return SILENT
+                return silent
     head = words(post.reply, _HEAD)
     if head[0] != REPLY:
         return FOREIGN

@@ -105,6 +105,8 @@ class Outside:
         match why:
             case exchange.SILENT:
                 return f"did not answer within {float(self._post.timeout_s):g} s {at}{self._what_came(more)}"
+            case exchange.INTERRUPTED:
+                return f"did not answer within {exchange.AFTER_SIGNAL_S:g} s of a signal {at}"
             case exchange.TOO_LONG:
                 return f"answered with more than {self._post.reply_bytes} bytes {at}"
             case exchange.FOREIGN:

@@ -2,6 +2,11 @@
 
 import os
 import re
+import shlex
+import signal
+import subprocess
+import sys
+import time
 
 import numpy as np
 import outside
@@ -138,3 +143,28 @@ def test_a_process_that_fails_is_an_outcome_with_its_words(scenario, how):
     assert re.fullmatch(WORDS[how], ending.detail), ending.detail
     assert ending.t_s == pytest.approx(0.049)
     assert len(trace.stop()) > 10  # the arm is stopped and held
+
+
+def test_ctrl_c_ends_a_run_whose_controller_hangs_and_leaves_nothing(tmp_path):
+    """Its time limit is a minute: the signal is not made to wait for that."""
+    hung = tmp_path / "hung"
+    told = f"import os, runpy, sys; open({str(hung)!r}, 'w').write(str(os.getpid()))"
+    program = (
+        f"{told}; sys.argv = ['x', 'hangs', '50']; runpy.run_path({outside.__file__!r}, run_name='__main__')"
+    )
+    long = "controller.torque_law={type: external, timeout_s: 60}"
+    words = ["run", "circle_lwr4plus", "--controller", "external_torque", "--set", long, "--no-record"]
+    given = f"mine={shlex.join([sys.executable, '-S', '-E', '-c', program])}"
+    command = [sys.executable, "-m", "surgsim", *words, "--external", given, "--out", str(tmp_path / "run")]
+    run = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
+    until = time.monotonic() + 60.0
+    while not hung.exists() and time.monotonic() < until:
+        time.sleep(0.05)
+    time.sleep(1.0)
+    run.send_signal(signal.SIGINT)
+    _, said = run.communicate(timeout=20.0)
+    assert run.returncode == 130
+    assert "interrupted" in said
+    with pytest.raises(ProcessLookupError):
+        os.kill(int(hung.read_text(encoding="utf-8")), 0)
+    assert not (tmp_path / "run").exists()

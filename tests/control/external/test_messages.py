@@ -1,9 +1,12 @@
 """What is exchanged: the layout in JSON and in C, what stands in a request, and what is refused."""
 
 import json
+import re
+import shutil
 import struct
 import subprocess
 import sys
+import textwrap
 from pathlib import Path
 
 import numpy as np
@@ -18,7 +21,7 @@ from surgsim.control.external.layout import JOINT_VELOCITY, layout_hash, request
 from surgsim.control.external.outside import Outside
 from surgsim.control.external.texts import header_text, layout_json
 from surgsim.control.seen import new_seen
-from surgsim.errors import SurgsimError
+from surgsim.errors import Outcome, SurgsimError
 from surgsim.scenario.externals import configured
 from surgsim.simulate.loop import Simulation, simulate
 from surgsim.simulate.setup import prepare
@@ -161,6 +164,44 @@ def test_the_function_without_its_decorator_asks_the_same(arm):
     one.close()
     np.testing.assert_array_equal(*answers)
     np.testing.assert_allclose(kin.Jv_WT @ answers[0], seen.v_WTd - 5.0 * seen.p_WT, atol=1e-9)
+
+
+def test_the_example_in_python_is_pinv_and_fails_when_it_is_told_to(scenario):
+    program = f"{sys.executable} {EXAMPLES / 'python' / 'controller.py'}"
+    made = scenario("controller.resolver={type: external}", controller="pinv")
+    with giving({"mine": program}):
+        found, inside = simulate(made), simulate(scenario(controller="pinv"))
+    np.testing.assert_allclose(found.block("q"), inside.block("q"), atol=1e-9)
+    with giving({"mine": f"{program} --dies-at 0.1"}):
+        ending = simulate(made).meta.ending
+    assert ending.outcome is Outcome.EXTERNAL_FAILED
+    assert ending.detail.endswith("at 0.100 s; its last words: the controller dies, as it was told to")
+
+
+@pytest.mark.needs("compiler")
+def test_what_the_page_says_is_true(scenario, tmp_path):
+    """Its programs in C and in Python, and its function, are one controller: the same trace of each."""
+    page = (EXAMPLES.parents[1] / "docs" / "external_controllers.md").read_text(encoding="utf-8")
+    program, declares = (
+        textwrap.dedent(code) for code in re.findall(r"^ *```c\n(.*?)^ *```$", page, re.M | re.S)
+    )
+    python = re.search(r"^```text\n(from surgsim_external .*?)^```$", page, re.M | re.S)[1]
+    (tmp_path / "surgsim_external.h").write_text(header_text(), encoding="utf-8")
+    (tmp_path / "mine.c").write_text(program, encoding="utf-8")
+    (tmp_path / "library.c").write_text(program.replace("static ", "") + declares, encoding="utf-8")
+    (tmp_path / "mine.py").write_text(python, encoding="utf-8")
+    for name in ("surgsim_external.py", "layout.json"):
+        shutil.copy(EXAMPLES / "python" / name, tmp_path)
+    subprocess.run(["cc", "-O2", "-o", "mine", "mine.c"], cwd=tmp_path, check=True)
+    subprocess.run(["cc", "-O2", "-shared", "-fPIC", "-o", "mine.so", "library.c"], cwd=tmp_path, check=True)
+    traces = []
+    for command in ("mine", "mine.so:follow", "mine.py"):
+        start = f"{sys.executable} " if command.endswith(".py") else ""
+        with giving({"mine": f"{start}{tmp_path / command}"}):
+            traces.append(simulate(scenario(controller="external_torque")))
+    assert traces[0].meta.ending.outcome is Outcome.COMPLETED
+    for trace in traces[1:]:
+        np.testing.assert_allclose(trace.block("q"), traces[0].block("q"), rtol=0.0, atol=1e-12)
 
 
 REFUSED = {
