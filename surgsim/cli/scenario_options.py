@@ -50,10 +50,10 @@ def externals_given(options: argparse.Namespace) -> Iterator[None]:
     if texts is None:  # a command that runs none
         yield
         return
-    from surgsim.control.external.given import giving, parse_given
-    from surgsim.scenario.externals import configured
+    from surgsim.control.external.given import parse_given
+    from surgsim.scenario.externals import externals_given as given
 
-    with giving({**configured(), **parse_given(texts)}):
+    with given(parse_given(texts)):
         yield
 
 

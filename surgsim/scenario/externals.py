@@ -5,11 +5,25 @@ scenario runs no program of theirs.
 """
 
 import os
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 
-from surgsim.control.external.given import parse_given
+from surgsim.control.external.given import giving, parse_given
 from surgsim.errors import SurgsimError
 from surgsim.scenario.yaml_text import read_yaml
+
+
+@contextmanager
+def externals_given(commands: Mapping[str, str]) -> Iterator[None]:
+    """Within the block, external controllers have these commands, and others those of the user's own file.
+
+    Raises:
+        SurgsimError: If a name is none, or that file is not right.
+    """
+    named = parse_given([f"{name}={command}" for name, command in commands.items()], "external controllers")
+    with giving({**configured(), **named}):
+        yield
 
 
 def config_file() -> Path:

@@ -6,6 +6,7 @@ from pathlib import Path
 import outside
 from batches import Here, short_run
 
+import surgsim
 from surgsim.cli.main import main
 from surgsim.compare.engine import Batch, compare
 from surgsim.compare.job import Job
@@ -84,3 +85,13 @@ def test_what_cannot_be_started_declares_nothing():
     with giving({"mine": "false"}):
         assert externals_of(made) == {"mine": None}
     assert externals_of(load_scenario("circle_lwr4plus")) == {}
+
+
+def test_from_python():
+    run = surgsim.run(
+        "circle_lwr4plus",
+        controller="external_velocity",
+        task={"duration_s": 0.25, "ramp_s": 0.1, "hold_start_s": 0.0, "hold_end_s": 0.0, "radius_m": 0.002},
+        externals={"mine": outside.command("ends", 50)},
+    )
+    assert run.outcome == "external_failed"
