@@ -147,4 +147,4 @@ class Outside:
             self._process.close()
 
     def __reduce__(self) -> NoReturn:
-        raise TypeError(f"what {self._who} remembers is in a process of its own")
+        raise TypeError(f"what {self._who} remembers is in a process of its own, or goes by its addresses")

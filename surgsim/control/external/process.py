@@ -72,7 +72,7 @@ class Process:
         """
         try:
             return read_declaration(self._exchange(content, timeout_s), self._who)
-        except SurgsimError:
+        except BaseException:
             self.kill()
             raise
 
@@ -81,31 +81,30 @@ class Process:
         ask, answer = self.files
         until, size, got = time.monotonic() + timeout_s, declaration().dtype.itemsize, b""
         os.set_blocking(ask, False)
-        while len(got) < size:
-            left = until - time.monotonic()
-            readable, writable, _ = select.select([answer], [ask] if content else [], [], max(0.0, left))
-            if not readable and not writable:
-                whole = f"{len(got)} of {size} bytes of a declaration" if got else "nothing"
-                text = f"{self._who} did not declare itself within {timeout_s:g} s: it said {whole}"
-                raise SurgsimError(f"{text}{self.last_words}")
+        while content or len(got) < size:
+            readable, writable = _ready(answer if len(got) < size else None, ask if content else None, until)
             if writable:
-                with contextlib.suppress(BrokenPipeError):
+                try:
                     content = content[os.write(ask, content) :]
-                    continue
-                content = b""
+                except BrokenPipeError:
+                    content, readable = (
+                        b"",
+                        True,
+                    )  # it has ended: what it said before is read, and then its end
+            elif not readable:
+                raise SurgsimError(f"{self._who} {_not_said(len(got), size, timeout_s)}{self.last_words}")
             if readable:
-                more = os.read(answer, size - len(got))
+                more = os.read(answer, size - len(got)) if len(got) < size else b""
                 if not more:
-                    raise SurgsimError(
-                        f"{self._who} {self.ended()} before it declared itself{self.last_words}"
-                    )
+                    text = f"{self._who} {self.ended()} before it declared itself"
+                    raise SurgsimError(f"{text}{self.last_words}")
                 got += more
         os.set_blocking(ask, True)
         return got
 
     def ended(self) -> str:
         """How it ended; it is given a moment for that. It is killed if it is still there."""
-        if not _has_ended(self._popen.pid, 0.1):
+        if not _has_ended(self._popen, 0.1):
             self.kill()
             return "closed its standard output"
         self.kill()
@@ -132,6 +131,25 @@ class Process:
         self._end()
 
 
+def _ready(answer: int | None, ask: int | None, until: float) -> tuple[bool, bool]:
+    """Whether an answer can be read, and whether can be asked, as soon as either can; neither: time is up."""
+    watch = select.poll()
+    if answer is not None:
+        watch.register(answer, select.POLLIN)
+    if ask is not None:
+        watch.register(ask, select.POLLOUT)
+    ready = dict(watch.poll(max(0.0, 1e3 * (until - time.monotonic()))))
+    return answer in ready, ask in ready
+
+
+def _not_said(got: int, size: int, timeout_s: float) -> str:
+    """What of a declaration is missing when time is up."""
+    if got == size:
+        return f"did not read the description of the arm within {timeout_s:g} s"
+    whole = f"{got} of {size} bytes of a declaration" if got else "nothing"
+    return f"did not declare itself within {timeout_s:g} s: it said {whole}"
+
+
 def _hear(popen: "subprocess.Popen[bytes]", chunks: deque[bytes]) -> None:
     """Keep the end of what it writes to standard error."""
     assert popen.stderr is not None
@@ -147,7 +165,7 @@ def _end(popen: "subprocess.Popen[bytes]", hearing: threading.Thread, grace_s: f
         with contextlib.suppress(OSError):
             file.close()
     try:
-        _has_ended(popen.pid, grace_s)
+        _has_ended(popen, grace_s)
     finally:
         with contextlib.suppress(OSError):
             os.killpg(popen.pid, signal.SIGKILL)  # before it is reaped: the number is still its own
@@ -155,17 +173,18 @@ def _end(popen: "subprocess.Popen[bytes]", hearing: threading.Thread, grace_s: f
         hearing.join(_GRACE_S)
 
 
-def _has_ended(pid: int, within_s: float) -> bool:
-    """Whether a child ends within a time; it is not reaped."""
+def _has_ended(popen: "subprocess.Popen[bytes]", within_s: float) -> bool:
+    """Whether a child ends within a time; it is not reaped, where the system can tell without that."""
     until = time.monotonic() + within_s
     while True:
-        try:
-            if os.waitid(os.P_PID, pid, os.WEXITED | os.WNOHANG | os.WNOWAIT) is not None:
-                return True
-        except ChildProcessError:
-            return True
-        if time.monotonic() >= until:
-            return False
+        if not hasattr(os, "waitid"):
+            ended = popen.poll() is not None
+        elif popen.returncode is not None:
+            ended = True
+        else:
+            ended = os.waitid(os.P_PID, popen.pid, os.WEXITED | os.WNOHANG | os.WNOWAIT) is not None
+        if ended or time.monotonic() >= until:
+            return ended
         time.sleep(_PAUSE_S)
 
 

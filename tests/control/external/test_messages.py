@@ -221,6 +221,22 @@ def test_a_program_that_does_not_declare_itself_is_refused(arm, code):
         Outside("mine", arm, JOINT_VELOCITY, timeout_s=0.2, start_timeout_s=0.3)
 
 
+def test_a_program_that_declares_itself_and_reads_no_further_is_refused(arm, monkeypatch):
+    """A pipe holds less than the description of the arm: the next request would be read as its rest."""
+    layout = layout_json()
+    told = struct.pack(
+        "<4q64s64s", layout["messages"]["declaration"]["magic"], 1, layout["hash"], 0, b"deaf", b"0"
+    )
+    program = f"import os, time; os.write(1, bytes.fromhex('{told.hex()}')); time.sleep(60)"
+    monkeypatch.setattr("surgsim.control.external.greeting.mjcf_of", lambda _: "x" * 200_000)
+    words = r"did not read the description of the arm within 0\.5 s"
+    with (
+        giving({"mine": f'{sys.executable} -S -E -c "{program}"'}),
+        pytest.raises(SurgsimError, match=words),
+    ):
+        Outside("mine", arm, JOINT_VELOCITY, timeout_s=0.2, start_timeout_s=0.5)
+
+
 def test_a_program_of_another_layout_is_told_what_to_do(arm, tmp_path):
     layout = layout_json()
     told = struct.pack("<4q64s64s", layout["messages"]["declaration"]["magic"], 1, 12345, 0, b"old", b"0")
