@@ -13,6 +13,7 @@ from surgsim.cli.scenario_options import naming_file
 from surgsim.control.controller import ControllerConfig
 from surgsim.errors import UnreachableError
 from surgsim.runs.folder import execute, run_to_folder, summary_of_result
+from surgsim.runs.parts import check_externals
 from surgsim.scenario.externals import externals_given
 from surgsim.scenario.load import Source
 from surgsim.scenario.schema import Scenario
@@ -60,6 +61,7 @@ def run(
     checked = load(scenario, controller=controller, seed=seed, settings=settings, **blocks)
     folder = None if out is None else Path(out)
     with externals_given(externals or {}):
+        check_externals([checked])
         try:
             with _shown(checked, progress) as report:
                 if folder is None:

@@ -10,7 +10,7 @@ from pydantic import BaseModel
 
 from surgsim.catalog import PartConfig
 from surgsim.control.external.declared import last_declared
-from surgsim.control.external.given import command_for
+from surgsim.control.external.given import check_named, command_for
 from surgsim.control.policies.registry import find_policy
 from surgsim.control.resolvers.external import ExternalConfig
 from surgsim.control.resolvers.policy import PolicyConfig
@@ -75,15 +75,13 @@ def _declared(part: ExternalConfig | ExternalLawConfig, scenario: Scenario) -> d
 
 
 def check_externals(scenarios: Iterable[Scenario]) -> None:
-    """Refuse scenarios that name an external controller for which no command is given.
+    """Refuse scenarios with an external controller that has no command, or without one that was asked for.
 
     Raises:
         SurgsimError: For the first.
     """
-    for scenario in scenarios:
-        for part in _parts(scenario.controller):
-            if isinstance(part, ExternalConfig | ExternalLawConfig):
-                command_for(part.name)
+    parts = (part for scenario in scenarios for part in _parts(scenario.controller))
+    check_named(part.name for part in parts if isinstance(part, ExternalConfig | ExternalLawConfig))
 
 
 def _parts(value: Any) -> Iterator[PartConfig]:

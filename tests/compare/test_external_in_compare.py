@@ -4,6 +4,7 @@ import json
 from pathlib import Path
 
 import outside
+import pytest
 from batches import Here, short_run
 
 import surgsim
@@ -13,6 +14,7 @@ from surgsim.compare.job import Job
 from surgsim.compare.suite import SuiteConfig
 from surgsim.compare.workers import run_jobs
 from surgsim.control.external.given import giving
+from surgsim.errors import SurgsimError
 from surgsim.runs.parts import externals_of
 from surgsim.scenario.load import load_scenario
 
@@ -78,6 +80,21 @@ def test_without_a_command_nothing_is_begun(tmp_path, capsys):
     tune = ["tune", "external_velocity", *on, *NAMELESS]
     assert main(tune) == 2
     assert "has no command" in capsys.readouterr().err
+
+
+def test_one_that_no_run_names_is_refused(tmp_path, capsys):
+    """A person who forgot --controller would look at the results of another one."""
+    given = ["--external", f"lab={outside.command()}", "--out", str(tmp_path / "out")]
+    for command in ("run", "compare", "check"):
+        words = given if command != "check" else given[:2]
+        assert main([command, "circle_lwr4plus", *words]) == 2
+        assert "--external lab: no controller of these runs names it" in " ".join(
+            capsys.readouterr().err.split()
+        )
+    assert main(["run", "circle_lwr4plus", "--controller", "external_torque", *given]) == 2
+    assert capsys.readouterr().err.endswith("no controller of these runs names it; they name mine\n")
+    with pytest.raises(SurgsimError, match="--external lab: no controller"):
+        surgsim.run("circle_lwr4plus", externals={"lab": "false"})
 
 
 def test_what_cannot_be_started_declares_nothing():

@@ -9,15 +9,11 @@ process: it says once that there is no command.
 import json
 import math
 import os
-import random
-import shlex
-import signal
 import struct
 import sys
 import time
-from pathlib import Path
 
-LAYOUT = Path(__file__).parents[2] / "examples" / "external" / "python" / "layout.json"
+LAYOUT = os.path.join(os.path.dirname(__file__), "../../examples/external/python/layout.json")
 FAILURES = (
     "killed",
     "ends",
@@ -36,7 +32,9 @@ NAME, RELEASE = "a controller of the tests", "3.1"
 
 def command(*words):
     """What starts it."""
-    return shlex.join([sys.executable, "-S", "-E", str(Path(__file__)), *map(str, words)])
+    import shlex  # which the process itself needs not wait for
+
+    return shlex.join([sys.executable, "-S", "-E", __file__, *map(str, words)])
 
 
 def pinv(seen):
@@ -96,7 +94,8 @@ def following(seen):
 
 def serve(fails, at, seed, release):
     """Answer until the run is over."""
-    layout = json.loads(LAYOUT.read_text(encoding="utf-8"))
+    with open(LAYOUT, encoding="utf-8") as file:
+        layout = json.load(file)
     messages = layout["messages"]
     hello = struct.unpack("<8q", os.read(0, messages["hello"]["bytes"]))
     text = b""
@@ -106,11 +105,11 @@ def serve(fails, at, seed, release):
     told = (messages["declaration"]["magic"], layout["version"], layout["hash"], 0)
     os.write(1, struct.pack("<4q64s64s", *told, NAME.encode(), release.encode()))
     answer = pinv if hello[6] == layout["gives"]["joint_velocity"] else following
-    size, draws = messages["request"]["bytes"], random.Random(seed)
+    size = messages["request"]["bytes"]
     while len(content := os.read(0, size)) == size:
         seen = unpacked(content, messages["request"]["fields"])
         if fails in FAILURES and seen["tick"] == at:
-            fail(fails, seen, messages["reply"], draws)
+            fail(fails, seen, messages["reply"], seed)
         found = None if fails == "gives_up" and seen["tick"] == at else answer(seen)
         os.write(1, packed(messages["reply"], seen["tick"], found))
 
@@ -133,8 +132,12 @@ def packed(reply, tick, answer, status=0):
     return struct.pack("<3q8d", reply["magic"], tick, 1 if answer is None else status, *values)
 
 
-def fail(how, seen, reply, draws):
+def fail(how, seen, reply, seed):
     """Fail once in this way; afterwards there is nothing to be heard."""
+    import random
+    import signal
+
+    draws = random.Random(seed)
     right = packed(reply, seen["tick"], [0.1] * seen["n"])
     if how == "killed":
         os.kill(os.getpid(), signal.SIGKILL)

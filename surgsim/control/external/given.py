@@ -9,11 +9,36 @@ from surgsim.errors import SurgsimError, unknown_name
 
 _NONE: Mapping[str, str] = {}
 _given: ContextVar[Mapping[str, str]] = ContextVar("given", default=_NONE)
+_asked_for: ContextVar[frozenset[str]] = ContextVar("asked_for", default=frozenset())
 
 
 def given() -> tuple[tuple[str, str], ...]:
     """Names and commands that are given here, as another process can be given them."""
     return tuple(sorted(_given.get().items()))
+
+
+@contextmanager
+def asking_for(names: Iterable[str]) -> Iterator[None]:
+    """Within the block, runs have to name each of these external controllers."""
+    token = _asked_for.set(frozenset(names))
+    try:
+        yield
+    finally:
+        _asked_for.reset(token)
+
+
+def check_named(named: Iterable[str]) -> None:
+    """Refuse runs that name these external controllers, if one has no command or another was asked for.
+
+    Raises:
+        SurgsimError: For the first.
+    """
+    used = sorted(set(named))
+    for name in used:
+        command_for(name)
+    if idle := sorted(_asked_for.get().difference(used)):
+        known = f"they name {', '.join(used)}" if used else "give --controller external_torque, for instance"
+        raise SurgsimError(f"--external {idle[0]}: no controller of these runs names it; {known}")
 
 
 @contextmanager
