@@ -31,8 +31,8 @@ def externals_given(commands: Mapping[str, str]) -> Iterator[None]:
 def config_file() -> Path:
     """Where the file would be."""
     given = os.environ.get("XDG_CONFIG_HOME", "")
-    folder = Path(given) if os.path.isabs(given) else Path("~/.config").expanduser()
-    return folder / "surgsim" / "external.yaml"
+    folder = given if os.path.isabs(given) else os.path.expanduser("~/.config")
+    return Path(folder) / "surgsim" / "external.yaml"
 
 
 def configured() -> dict[str, str]:
@@ -42,7 +42,7 @@ def configured() -> dict[str, str]:
         SurgsimError: If the file is no mapping of names to commands.
     """
     file = config_file()
-    if not file.is_file():
+    if not os.path.isfile(file):  # also where its folder may not be looked into
         return {}
     tree = read_yaml(file).tree
     for name, command in tree.items():
