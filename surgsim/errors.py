@@ -90,3 +90,4 @@ class Outcome(enum.Enum):
     FORCE_LIMIT = "A force on trocar or tip passed its limit."
     TORQUE_RATE_LIMIT = "The commanded torque changed faster than the arm's interface takes."
     INFEASIBLE = "The controller found no command that meets its hard constraints."
+    EXTERNAL_FAILED = "The external controller ended, did not answer, or gave what is no answer."

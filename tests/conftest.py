@@ -1,14 +1,16 @@
 """Shared fixtures: the arm, random problems for resolvers and torque laws, short scenarios, traces."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
+import outside
 import pytest
 import usual_arm
 from batches import short_run
 
+from surgsim.control.external.given import giving
 from surgsim.control.problem import VelocityProblem
 from surgsim.control.torque_laws.base import TorqueProblem
 from surgsim.errors import Outcome
@@ -19,6 +21,20 @@ from surgsim.simulate.setup import Setup
 from surgsim.trace.trace import Ending, Trace, TraceMeta, base_blocks
 
 pytest_plugins = ["left_out", "warm"]
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _external_controller(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    """An external controller `mine`, which shipped controllers name: in every command too, that of the tests.
+
+    Commands read it from a user's own file; that of the person who runs the tests is not read.
+    """
+    folder = tmp_path_factory.mktemp("config")
+    (folder / "surgsim").mkdir()
+    (folder / "surgsim" / "external.yaml").write_text(f"mine: {outside.command()}\n", encoding="utf-8")
+    with pytest.MonkeyPatch.context() as patch, giving({"mine": outside.command()}):
+        patch.setenv("XDG_CONFIG_HOME", str(folder))
+        yield
 
 
 @pytest.fixture(scope="session")

@@ -17,6 +17,7 @@ from surgsim.compare.engine import compare as run_batch
 from surgsim.compare.suite import with_changes
 from surgsim.control.controller import ControllerConfig
 from surgsim.errors import SurgsimError
+from surgsim.scenario.externals import externals_given
 from surgsim.scenario.load import Source
 from surgsim.scenario.plain import assignments_of
 from surgsim.scenario.schema import Scenario
@@ -40,6 +41,7 @@ def compare(
     resume: bool = False,
     record: bool = False,
     progress: bool = False,
+    externals: Mapping[str, str] | None = None,
     **blocks: Any,
 ) -> Comparison:
     """Run a suite, or scenarios with several controllers and seeds, and compare them.
@@ -57,6 +59,7 @@ def compare(
         resume: Whether whole results in `out` are kept and only the missing ones run.
         record: Whether every run is recorded, so that it has a trace.
         progress: Whether standard error shows how far the batch is.
+        externals: Commands of controllers outside surgsim by name, as `--external` of the command.
         **blocks: Values by a scenario's top-level key for every run, see `surgsim.load`.
 
     Returns:
@@ -74,7 +77,8 @@ def compare(
     suite, folder = suite_of(what, controllers)
     suite = with_changes(suite, None, _seeds(seeds), record, assignments_of(blocks, settings), matters)
     runner, count = runner_of(engine, address), workers_for(jobs)
-    with _target(out) as target, _shown(suite.name, progress) as report:
+    given = externals_given(externals or {})
+    with given, _target(out) as target, _shown(suite.name, progress) as report:
         batch = Batch(
             suite=suite, folder=folder, out=target, jobs=count, resume=resume, command="surgsim.compare"
         )

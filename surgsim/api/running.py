@@ -13,6 +13,8 @@ from surgsim.cli.scenario_options import naming_file
 from surgsim.control.controller import ControllerConfig
 from surgsim.errors import UnreachableError
 from surgsim.runs.folder import execute, run_to_folder, summary_of_result
+from surgsim.runs.parts import check_externals
+from surgsim.scenario.externals import externals_given
 from surgsim.scenario.load import Source
 from surgsim.scenario.schema import Scenario
 from surgsim.simulate.loop import Progress
@@ -28,6 +30,7 @@ def run(
     out: str | os.PathLike[str] | None = None,
     record: bool = True,
     progress: bool = False,
+    externals: Mapping[str, str] | None = None,
     **blocks: Any,
 ) -> Run:
     """Run a scenario, in memory unless `out` is given.
@@ -40,6 +43,7 @@ def run(
         out: Folder to write, the same as the command writes; None: nothing is written.
         record: Whether that folder holds a recording.
         progress: Whether standard error shows how far the run is.
+        externals: Commands of controllers outside surgsim by name, as `--external` of the command.
         **blocks: Values by a scenario's top-level key, see `surgsim.load`.
 
     Returns:
@@ -56,17 +60,20 @@ def run(
     """
     checked = load(scenario, controller=controller, seed=seed, settings=settings, **blocks)
     folder = None if out is None else Path(out)
-    try:
-        with _shown(checked, progress) as report:
-            if folder is None:
-                result = execute(checked, report)
-            else:
-                result = run_to_folder(checked, folder, record=record, progress=report)
-    except UnreachableError as error:
-        if isinstance(scenario, str | os.PathLike):
-            raise naming_file(os.fspath(scenario), error) from error
-        raise
-    return Run(summary_of_result(checked, result), scenario=checked, trace=result.trace, folder=folder)
+    with externals_given(externals or {}):
+        check_externals([checked])
+        try:
+            with _shown(checked, progress) as report:
+                if folder is None:
+                    result = execute(checked, report)
+                else:
+                    result = run_to_folder(checked, folder, record=record, progress=report)
+        except UnreachableError as error:
+            if isinstance(scenario, str | os.PathLike):
+                raise naming_file(os.fspath(scenario), error) from error
+            raise
+        summary = summary_of_result(checked, result)
+    return Run(summary, scenario=checked, trace=result.trace, folder=folder)
 
 
 def _shown(scenario: Scenario, progress: bool) -> AbstractContextManager[Progress | None]:

@@ -14,6 +14,8 @@ KINEMATIC = ("pinv", "gradient", "vprnn", "qp")
 """Controllers that are measured on the kinematic plant too."""
 _NEEDS = {"rcm_interaction_force": ("trocar.wall={}",)}
 """What a controller needs in the scenario to be run at all."""
+OUTSIDE = ("external_torque", "external_velocity")
+"""Controllers that need a program: a figure of theirs would be that program's."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -52,7 +54,8 @@ def kinematic(controller: str) -> Case:
 def all_cases() -> list[Case]:
     """Every case, in the order of the tables."""
     whole = [Case(name=name, source=name) for name in WHOLE]
-    return [*map(circle, shipped("controllers")), *whole, *map(kinematic, KINEMATIC)]
+    controllers = [name for name in shipped("controllers") if name not in OUTSIDE]
+    return [*map(circle, controllers), *whole, *map(kinematic, KINEMATIC)]
 
 
 def chosen(names: Sequence[str] | None) -> list[Case]:

@@ -27,6 +27,7 @@ def execute(options: argparse.Namespace) -> int:
     from surgsim.cli.main import print_error
     from surgsim.cli.table import print_text
     from surgsim.errors import SurgsimError
+    from surgsim.runs.parts import check_externals
     from surgsim.scenario.load import load_scenario
     from surgsim.scenario.yaml_text import dump_yaml
     from surgsim.simulate.setup import prepare
@@ -37,7 +38,9 @@ def execute(options: argparse.Namespace) -> int:
             scenario = load_scenario(
                 name, controller=options.controller, assignments=options.assignments, seed=options.seed
             )
+            check_externals([scenario])
             setup = prepare(scenario)
+            setup.controller.close()
         except SurgsimError as error:
             print_error(naming_file(name, error))
             wrong += 1

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from surgsim.cli.paths import path_argument
-from surgsim.cli.scenario_options import add_matters, add_settings
+from surgsim.cli.scenario_options import add_external, add_matters, add_settings
 
 MOST_SHARDS = 10_000
 HELP = "run a suite of scenarios and controllers, and compare them"
@@ -33,6 +33,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--controllers", metavar="A,B", help="controllers instead of the suite's")
     parser.add_argument("--seeds", metavar="0:10", help="seeds instead of the suite's: 0:10, 3 or 1,4,9")
     add_settings(parser, "change one value in every run; may be given again")
+    add_external(parser)
     parser.add_argument("--jobs", type=int, metavar="N", help="worker processes; default: the cores")
     parser.add_argument("--engine", choices=("local", "ray"), default="local", help="where runs are done")
     parser.add_argument("--address", metavar="HOST:PORT", help="the ray cluster's address")

@@ -21,6 +21,7 @@ KINDS = (
     "port-estimators",
     "instrument-estimators",
     "policies",
+    "externals",
     "plants",
     "disturbances",
     "props",
@@ -69,6 +70,10 @@ def items_of(kind: str) -> list[tuple[str, str]]:
         from surgsim.control.policies.registry import policy_names, policy_summary
 
         return [(name, policy_summary(name)) for name in policy_names()]
+    if kind == "externals":
+        from surgsim.scenario.externals import configured
+
+        return sorted(configured().items())
     if kind == "metrics":
         from surgsim.metrics.catalog import METRICS
 

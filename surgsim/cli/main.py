@@ -14,6 +14,7 @@ from collections.abc import Sequence
 from surgsim import __version__
 from surgsim.cli.kernels import compiling_shown
 from surgsim.cli.parser import Parser
+from surgsim.cli.scenario_options import externals_given
 from surgsim.cli.table import print_prose
 from surgsim.errors import SurgsimError
 from surgsim.runs.stop import Stopped, stopping_in_order
@@ -29,6 +30,7 @@ COMMANDS = (
     "reproduce",
     "bench",
     "adopt",
+    "external",
     "test-part",
     "completion",
 )
@@ -84,7 +86,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         with stopping_in_order(), compiling_shown():
             options = build_parser().parse_args(arguments)
-            return int(options.execute(options))
+            with externals_given(options):
+                return int(options.execute(options))
     except SurgsimError as error:
         print_error(error)
         return 2

@@ -42,11 +42,13 @@ def execute(options: argparse.Namespace) -> int:
     from surgsim.cli.table import print_prose
     from surgsim.errors import Outcome, UnreachableError
     from surgsim.runs.folder import run_to_folder
+    from surgsim.runs.parts import check_externals
     from surgsim.scenario.load import load_scenario
 
     scenario = load_scenario(
         options.scenario, controller=options.controller, assignments=options.assignments, seed=options.seed
     )
+    check_externals([scenario])
     operator, record = options.operator, not options.no_record
     name = f"{scenario.controller.name}-seed{scenario.seed}"
     folder = options.out or _default_folder(Path("runs") / scenario.name, name, operator)

@@ -1,15 +1,18 @@
 """Options that commands on scenarios share."""
 
 import argparse
+from collections.abc import Iterator
+from contextlib import contextmanager
 
 from surgsim.errors import ScenarioError, SurgsimError
 
 
 def add_scenario_options(parser: argparse.ArgumentParser) -> None:
-    """`--controller`, `--set` and `--seed`."""
+    """`--controller`, `--set`, `--seed` and `--external`."""
     parser.add_argument("--controller", metavar="NAME", help="controller instead of the scenario's own")
     add_settings(parser, "change one value; may be given again")
     parser.add_argument("--seed", type=int, metavar="N", help="seed instead of the scenario's own")
+    add_external(parser)
 
 
 def add_settings(parser: argparse.ArgumentParser, text: str) -> None:
@@ -22,6 +25,36 @@ def add_settings(parser: argparse.ArgumentParser, text: str) -> None:
         dest="assignments",
         help=text,
     )
+
+
+def add_external(parser: argparse.ArgumentParser) -> None:
+    """`--external`."""
+    parser.add_argument(
+        "--external",
+        action="append",
+        default=[],
+        metavar="NAME=COMMAND",
+        dest="externals",
+        help="the program, or library.so:function, of an external controller; may be given again",
+    )
+
+
+@contextmanager
+def externals_given(options: argparse.Namespace) -> Iterator[None]:
+    """Within the block, external controllers have the commands of command line and user's own file.
+
+    Raises:
+        SurgsimError: If a command cannot be read.
+    """
+    texts: list[str] | None = getattr(options, "externals", None)
+    if texts is None:  # a command that runs none
+        yield
+        return
+    from surgsim.control.external.given import parse_given
+    from surgsim.scenario.externals import externals_given as given
+
+    with given(parse_given(texts)):
+        yield
 
 
 def add_matters(parser: argparse.ArgumentParser) -> None:

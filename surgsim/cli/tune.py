@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from surgsim.cli.paths import path_argument
-from surgsim.cli.scenario_options import add_settings
+from surgsim.cli.scenario_options import add_external, add_settings
 
 if TYPE_CHECKING:
     from surgsim.tuning.trials import Trials
@@ -47,6 +47,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--keys", metavar="A,B", help="gains to tune, such as torque_law.rcm_damping_ratio")
     parser.add_argument("--seed", type=int, default=0, metavar="K", help="the optimiser's seed; default: 0")
     add_settings(parser, "change one value in every run; may be given again")
+    add_external(parser)
     parser.add_argument("--jobs", type=int, metavar="N", help="worker processes; default: the cores")
     parser.add_argument("--out", type=path_argument, metavar="DIR", help="folder of the results")
     parser.add_argument("--resume", action="store_true", help="go on with the runs that the folder holds")

@@ -22,6 +22,7 @@ from surgsim.recording.folders import make_folder
 from surgsim.recording.sealed import read_sealed, sealed
 from surgsim.runs.drafts import clear_drafts
 from surgsim.runs.exchange import restore_all
+from surgsim.runs.parts import check_externals
 from surgsim.runs.provenance import code_difference, provenance, provenance_of
 from surgsim.scenario.schema import Scenario
 
@@ -64,6 +65,7 @@ def compare(batch: Batch, report: Report | None = None, runner: Runner = run_job
     """
     specs = expand(batch.suite, batch.folder)
     scenarios = check_runs(specs)
+    check_externals(scenarios)
     rows = [_row(batch.suite, spec, scenario) for spec, scenario in zip(specs, scenarios, strict=True)]
     _check_names(rows)
     _prepare(batch)

@@ -1,10 +1,11 @@
 """One run of a batch, as a worker does it: from a scenario to a whole folder, whatever happens."""
 
 import traceback
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from surgsim.control.external.given import given, giving
 from surgsim.errors import Outcome, SurgsimError
 from surgsim.runs.folder import execute, summary_of, whole_folder, write_run, write_summary
 from surgsim.scenario.schema import Scenario
@@ -23,11 +24,13 @@ class Job:
         scenario_json: The resolved scenario.
         folder: The run's folder.
         record: Whether the recording is written.
+        externals: Names and commands of external controllers; those that are given where the job is made.
     """
 
     scenario_json: str
     folder: str
     record: bool
+    externals: tuple[tuple[str, str], ...] = field(default_factory=given)
 
     def scenario(self) -> Scenario:
         """The scenario."""
@@ -68,7 +71,8 @@ def attempt(job: Job) -> tuple[str, str]:
         of the traceback: a bug is a row of the table, not the end of the batch.
     """
     try:
-        return "done", do(job)
+        with giving(dict(job.externals)):
+            return "done", do(job)
     except DiskError as error:
         return "disk", str(error)
     except Exception:

@@ -119,7 +119,7 @@ class Bound:
     @property
     def addressed(self) -> tuple[int, ...]:
         """The parts whose numbers hold addresses, by the value of `Control.who`."""
-        return tuple(who for who, part in self.joined.items() if part.entered or part.below)
+        return tuple(who for who, part in self.joined.items() if part.holds_addresses)
 
     def forget_instrument(self) -> None:
         """Nothing is known of the instrument but the nominal model."""

@@ -187,6 +187,15 @@ class Controller:
         """Whether all its parts are compiled kernels that enter no Python."""
         return not self._bound.entered
 
+    def close(self) -> None:
+        """End what answers from outside surgsim; the controller cannot be asked afterwards."""
+        for part in (self.parts.resolver, self.parts.law):
+            while part is not None:
+                outside = getattr(part, "outside", None)
+                if outside is not None:
+                    outside.close()
+                part = getattr(part, "below", None)
+
     def reset(self) -> None:
         """Forget everything: the next tick is the first."""
         forget(self.control)

@@ -1,23 +1,28 @@
 """A controller that has no answer."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from surgsim.errors import Outcome
-from surgsim.tick.status import DIVERGED, INFEASIBLE, RANK_LOST
+from surgsim.tick.status import DIVERGED, EXTERNAL, INFEASIBLE, RANK_LOST
 
 Array = NDArray[np.float64]
+Words = str | Callable[[Any], str]
+"""What a status means: words, or a function of what the kernel saw."""
 _OUTCOMES = {
     INFEASIBLE: Outcome.INFEASIBLE,
     RANK_LOST: Outcome.INFEASIBLE,
     DIVERGED: Outcome.DIVERGED,
+    EXTERNAL: Outcome.EXTERNAL_FAILED,
 }
 _DETAILS = {
     INFEASIBLE: "no command meets the hard constraints",
     RANK_LOST: "the task Jacobian has lost rank",
     DIVERGED: "a state of the controller has grown past all bounds",
+    EXTERNAL: "the external controller gave no answer",
 }
 
 
@@ -38,7 +43,8 @@ class ControlFailure(Exception):
 
 
 def failure_of(
-    status: int, details: Mapping[int, str], data: Mapping[str, Array] | None = None
+    status: int, details: Mapping[int, Words], data: Mapping[str, Array] | None = None, seen: Any = None
 ) -> ControlFailure:
     """The failure that a kernel's `status` stands for, in the part's own words where it has some."""
-    return ControlFailure(_OUTCOMES[status], details.get(status, _DETAILS[status]), data)
+    words = details.get(status, _DETAILS[status])
+    return ControlFailure(_OUTCOMES[status], words if isinstance(words, str) else words(seen), data)

@@ -46,6 +46,19 @@ class Inside(Protocol):
         ...
 
 
+class Elsewhere(Protocol):
+    """A controller outside surgsim that a kernel asks, by addresses in its gains."""
+
+    @property
+    def has_state(self) -> bool:
+        """Whether it remembers something that is not in the kernel's memory."""
+        ...
+
+    def close(self) -> None:
+        """End it: it is not asked again."""
+        ...
+
+
 @compiled
 def resolve_below(gains: Array, seen: Seen, memory: Array, out: Resolved) -> int:
     """Ask the resolver below, which has `memory` for its own."""

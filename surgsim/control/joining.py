@@ -53,12 +53,19 @@ class Joined:
         gains: What that is given.
         entered: What of the part is entered in Python, in the order of a tick.
         below: The resolver below it.
+        asks_outside: Whether it asks a controller outside surgsim.
     """
 
     kernel: int
     gains: Array
     entered: tuple[PythonPart, ...] = ()
     below: "Joined | None" = None
+    asks_outside: bool = False
+
+    @property
+    def holds_addresses(self) -> bool:
+        """Whether its numbers hold addresses."""
+        return bool(self.entered or self.below or self.asks_outside)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -76,8 +83,10 @@ def is_compiled(part: Any) -> bool:
 
 
 def has_state_in_python(part: Any) -> bool:
-    """Whether the part is a Python object, or a kernel that enters one."""
-    return not hasattr(part, "kernel") or getattr(part, "inside", None) is not None
+    """Whether the part is a Python object, or a kernel that enters one, or what it asks remembers."""
+    outside: Any = getattr(part, "outside", None)
+    remembers = outside is not None and outside.has_state
+    return not hasattr(part, "kernel") or getattr(part, "inside", None) is not None or remembers
 
 
 def join(part: Any, desk: Desk, signature: Any, call: Call, name: str) -> Joined:
@@ -96,7 +105,10 @@ def join(part: Any, desk: Desk, signature: Any, call: Call, name: str) -> Joined
     own = furnish(part, desk, name)
     if is_compiled(part):
         kernel = address_of(part.kernel, signature)
-        return Joined(kernel=kernel, gains=own.gains, entered=own.entered, below=own.below)
+        outside = getattr(part, "outside", None) is not None
+        return Joined(
+            kernel=kernel, gains=own.gains, entered=own.entered, below=own.below, asks_outside=outside
+        )
     entry = PythonPart(lambda: part.kernel(own.gains, desk.seen, desk.memory, desk.out), _status_of)
     return Joined(
         kernel=address_of(python_kernel, signature),

@@ -128,8 +128,9 @@ class Account(Record):
 
 LAW, LAW_SIZE = overlay(Law)
 ACCOUNT, ACCOUNT_SIZE = overlay(Account)
-STIFFNESS, GEAR, ROTOR, LOOP, COULOMB, STATIC, VISCOUS, RIPPLE, BIAS, WAVE, LINK_DAMPING, LINK_DRY = range(12)
-"""Rows of the gains: K, D, B, D_s, friction, ripple, the torque sensor's bias and ripple; then of the links."""
+STIFFNESS, GEAR, ROTOR, LOOP, COULOMB, STATIC, VISCOUS, RIPPLE = range(8)
+BIAS, WAVE, LINK_DAMPING, LINK_DRY = range(8, 12)
+"""Rows of the gains: K, D, B, D_s, friction, ripple, the torque sensor's bias and ripple; of the links."""
 THETA, OMEGA, MOTOR, COMMAND, OTHERS, FRICTION, MOVED, TAKEN, RUBBED = range(9)
 """Rows of the memory: motor's position and speed, its torque, the command that acts, other forces on the
 links, friction as observed, the links' correction of a step, friction and ripple as they are, dry friction of

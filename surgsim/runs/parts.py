@@ -1,7 +1,7 @@
 """Which other packages gave a part to a run, and which file its policy stands in."""
 
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -9,10 +9,15 @@ from typing import Any
 from pydantic import BaseModel
 
 from surgsim.catalog import PartConfig
+from surgsim.control.external.declared import last_declared
+from surgsim.control.external.given import check_named, command_for
 from surgsim.control.policies.registry import find_policy
+from surgsim.control.resolvers.external import ExternalConfig
 from surgsim.control.resolvers.policy import PolicyConfig
+from surgsim.control.torque_laws.external import ExternalLawConfig
 from surgsim.errors import SurgsimError
 from surgsim.metrics.outside import GROUP as METRICS
+from surgsim.models.arm import ArmModel
 from surgsim.plugins import all_offers, offers
 from surgsim.runs.sources import hash_of, package_sha256
 from surgsim.scenario.schema import Scenario
@@ -40,6 +45,43 @@ def policies_of(scenario: Scenario) -> dict[str, str | None]:
     """Hash of the file that each policy of `scenario` stands in; None for one that stands in no file."""
     names = {part.name for part in _parts(scenario) if isinstance(part, PolicyConfig)}
     return {name: _file_hash(_home(_policy(name))) for name in sorted(names)}
+
+
+def externals_of(scenario: Scenario) -> dict[str, dict[str, str] | None]:
+    """Name and version that each external controller of `scenario` declares; None if it declares nothing.
+
+    One that this process has not asked yet is started and asked.
+    """
+    found: dict[str, dict[str, str] | None] = {}
+    for part in _parts(scenario.controller):
+        if isinstance(part, ExternalConfig | ExternalLawConfig) and part.name not in found:
+            try:
+                found[part.name] = _declared(part, scenario)
+            except SurgsimError:  # of a run that was refused for it
+                found[part.name] = None
+    return dict(sorted(found.items()))
+
+
+def _declared(part: ExternalConfig | ExternalLawConfig, scenario: Scenario) -> dict[str, str]:
+    """What an external controller says of itself."""
+    told = last_declared(command_for(part.name))
+    if told is None:
+        asked = part.build(ArmModel(scenario.scene)).outside
+        assert asked is not None
+        asked.close()
+        told = last_declared(command_for(part.name))
+    assert told is not None
+    return {"name": told.name, "version": told.release}
+
+
+def check_externals(scenarios: Iterable[Scenario]) -> None:
+    """Refuse scenarios with an external controller that has no command, or without one that was asked for.
+
+    Raises:
+        SurgsimError: For the first.
+    """
+    parts = (part for scenario in scenarios for part in _parts(scenario.controller))
+    check_named(part.name for part in parts if isinstance(part, ExternalConfig | ExternalLawConfig))
 
 
 def _parts(value: Any) -> Iterator[PartConfig]:

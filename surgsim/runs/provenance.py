@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import surgsim
-from surgsim.runs.parts import plugins_of, policies_of
+from surgsim.runs.parts import externals_of, plugins_of, policies_of
 from surgsim.runs.sources import LATER_ROOMS, ROOT, sources_sha256
 from surgsim.scenario.schema import Scenario
 
@@ -44,13 +44,14 @@ def provenance_of(scenario: Scenario) -> dict[str, Any]:
     `code_sha256` is one hash of all that a result follows from beside its scenario: the sources of surgsim
     and of these packages, the policy's file, the versions of the numerical packages.
     """
-    told = {**provenance(), "plugins": plugins_of(scenario), "policies": policies_of(scenario)}
+    parts = {"plugins": plugins_of(scenario), "policies": policies_of(scenario)}
+    told = {**provenance(), **parts, "externals": externals_of(scenario)}
     return {**told, "code_sha256": _code_sha256(told), "scenario_sha256": scenario.sha256()}
 
 
 def _code_sha256(told: Mapping[str, Any]) -> str:
     packages = {name: told["packages"][name] for name in told["packages"] if name not in _OF_NO_CONSEQUENCE}
-    code = [told["sources_sha256"], packages, told["plugins"], told["policies"]]
+    code = [told["sources_sha256"], packages, told["plugins"], told["policies"], told["externals"]]
     return hashlib.sha256(json.dumps(code, sort_keys=True).encode()).hexdigest()
 
 
@@ -60,7 +61,7 @@ def code_difference(old: Mapping[str, Any], new: Mapping[str, Any]) -> str:
     before, now = old["packages"], new["packages"]
     names = sorted((before.keys() | now.keys()) - _OF_NO_CONSEQUENCE)
     words += [f"{n} {before.get(n)} not {now.get(n)}" for n in names if before.get(n) != now.get(n)]
-    for kind, word in (("plugins", "package"), ("policies", "policy")):
+    for kind, word in (("plugins", "package"), ("policies", "policy"), ("externals", "external controller")):
         names = sorted(old[kind].keys() | new[kind].keys())
         words += [f"{word} {name}" for name in names if old[kind].get(name) != new[kind].get(name)]
     return ", ".join(words)

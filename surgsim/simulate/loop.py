@@ -60,7 +60,11 @@ def simulate(scenario: Scenario, progress: Progress | None = None) -> Trace:
     Raises:
         SurgsimError: If it cannot be started, e.g. because the path is out of reach.
     """
-    return Simulation(prepare(scenario)).run(progress)
+    setup = prepare(scenario)
+    try:
+        return Simulation(setup).run(progress)
+    finally:
+        setup.controller.close()
 
 
 class Simulation:

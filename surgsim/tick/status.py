@@ -11,3 +11,5 @@ TOLD = 4
 """A Python part says why itself (`surgsim.tick.python_part`)."""
 TORQUE_RATE = 5
 """The commanded torque changes faster than the arm's interface takes."""
+EXTERNAL = 6
+"""A controller outside surgsim gave no answer (`surgsim.control.external`)."""

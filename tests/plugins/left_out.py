@@ -54,6 +54,7 @@ PARTS = {
     "ray": Part("Ray", lambda: importlib.util.find_spec("ray") is not None, "pip install 'surgsim[ray]'"),
     "opengl": Part("drawing", _draws, "neither EGL nor OSMesa"),
     "display": Part("window", lambda: shutil.which("Xvfb") is not None, "no Xvfb on the PATH"),
+    "compiler": Part("C", lambda: shutil.which("cc") is not None, "no C compiler on the PATH"),
     "mount": Part("full-disk", _may_mount, "this system lets us mount no small disk"),
 }
 

@@ -111,7 +111,10 @@ def test_a_policy_of_one_process_is_told_by_the_file_that_it_stands_in(scenario)
 
 
 def test_a_difference_is_put_into_words():
-    old = {"sources_sha256": "a", "packages": {"numpy": "1"}, "plugins": {}, "policies": {}}
-    new = {"sources_sha256": "b", "packages": {"numpy": "2", "rerun-sdk": "1"}, "plugins": {}, "policies": {}}
+    parts = {"plugins": {}, "policies": {}, "externals": {}}
+    old = {"sources_sha256": "a", "packages": {"numpy": "1"}, **parts}
+    new = {"sources_sha256": "b", "packages": {"numpy": "2", "rerun-sdk": "1"}, **parts}
     assert code_difference(old, new) == "sources of surgsim, numpy 1 not 2"
+    told = {"mine": {"name": "lab", "version": "2"}}
+    assert code_difference(old, {**old, "externals": told}) == "external controller mine"
     assert code_difference(old, old) == ""

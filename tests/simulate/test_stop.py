@@ -3,9 +3,11 @@
 import json
 
 import numpy as np
+import outside
 import pytest
 
 from surgsim.cli.main import main
+from surgsim.control.external.given import giving
 from surgsim.control.failure import ControlFailure
 from surgsim.errors import Outcome
 from surgsim.metrics.catalog import compute_metrics
@@ -18,6 +20,13 @@ STOPPING = [outcome for outcome in Outcome if outcome is not Outcome.COMPLETED]
 NAMES = {outcome.name.lower() for outcome in STOPPING}
 AT_REST_RAD_PER_S = 0.02
 FACING = "start.posture_rad=[1.5708, 0.0, 0.0, -1.5708, 0.0, 1.8675, 0.0]"
+
+
+@pytest.fixture(autouse=True)
+def _an_external_controller_that_ends():
+    """No scenario holds a command: that of `external_failed` is given here, and ends at its 500th request."""
+    with giving({"mine": outside.command("ends", 500)}):
+        yield
 
 
 def _on_panda(name):
@@ -42,6 +51,7 @@ def test_every_outcome_but_completion_has_a_scenario_of_its_name():
 @pytest.mark.parametrize("name", sorted(NAMES))
 def test_its_scenario_ends_in_it_on_the_command_line_and_the_recording_says_so(name, tmp_path, capsys):
     words = ["run", f"safety/{name}", "--json", "--out", str(tmp_path / "run"), "--set", "theatre=false"]
+    words += ["--external", f"mine={outside.command('ends', 500)}"]
     assert main(words) == 1
     printed = json.loads(capsys.readouterr().out)
     assert printed["outcome"]["name"] == name

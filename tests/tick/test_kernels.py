@@ -5,6 +5,7 @@ import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -17,12 +18,15 @@ from surgsim.control.torque_laws import TORQUE_LAWS
 from surgsim.simulate.loop import Simulation, simulate
 from surgsim.simulate.setup import prepare
 
+PLUGINS = Path(__file__).parents[1] / "plugins"
 PARTS = ("instrument", "port", "resolver", "law")
 ANSWERS = """
 import sys
 import numpy as np
+import outside
 from surgsim.contract.arms import arm_of, cases, scenes
 from surgsim.contract.problems import torque_problem, velocity_problem
+from surgsim.control.external.given import giving
 from surgsim.control.failure import ControlFailure
 from surgsim.control.port_estimators import PORT_ESTIMATORS
 from surgsim.control.resolvers import RESOLVERS
@@ -36,6 +40,8 @@ parts = [
     for catalog, make, call in kinds
     for name in catalog.names()
 ]
+mine = giving({"mine": outside.command()})
+mine.__enter__()
 usual = SceneConfig(robot=RobotConfig(name="lwr4plus"))
 for arm in map(arm_of, (usual, *scenes())):
     for config, make, call in parts:
@@ -56,7 +62,12 @@ for arm in map(arm_of, (usual, *scenes())):
 
 
 def _printed(program, *, compiled):
-    environment = {**os.environ, "NUMBA_DISABLE_JIT": "0" if compiled else "1"}
+    paths = [str(PLUGINS), *filter(None, [os.environ.get("PYTHONPATH")])]
+    environment = {
+        **os.environ,
+        "NUMBA_DISABLE_JIT": "0" if compiled else "1",
+        "PYTHONPATH": os.pathsep.join(paths),
+    }
     found = subprocess.run(
         [sys.executable, "-c", program], env=environment, capture_output=True, text=True, timeout=300
     )

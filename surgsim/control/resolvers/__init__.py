@@ -6,6 +6,7 @@ RESOLVERS = Catalog(
     "resolver",
     "surgsim.resolvers",
     {
+        "external": "surgsim.control.resolvers.external:ExternalConfig",
         "gradient": "surgsim.control.resolvers.gradient:GradientConfig",
         "hands_on": "surgsim.control.resolvers.hands_on:HandsOnConfig",
         "mink": "surgsim.control.resolvers.mink:MinkConfig",

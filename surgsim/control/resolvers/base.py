@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from surgsim.catalog import Surroundings
 from surgsim.columns import Block
-from surgsim.control.failure import ControlFailure, failure_of
-from surgsim.control.inside import Inside
+from surgsim.control.failure import ControlFailure, Words, failure_of
+from surgsim.control.inside import Elsewhere, Inside
 from surgsim.control.joining import Desk, furnish
 from surgsim.control.problem import Resolution, VelocityProblem
 from surgsim.control.seen import seen_of_velocity
@@ -95,6 +95,7 @@ class KernelResolver:
         examine: Arrays that let a failure be examined, from what the kernel saw and remembered.
         inside: What the kernel enters in Python.
         below: The resolver that the kernel calls; its memory is the end of this one's.
+        outside: What answers the kernel from outside surgsim, to be ended with the run.
     """
 
     kernel: ResolverKernel
@@ -102,10 +103,11 @@ class KernelResolver:
     gains: Array
     memory_size: int = 0
     columns: tuple[Block, ...] = ()
-    failures: Mapping[int, str | Callable[[Seen], str]] = field(default_factory=dict)
+    failures: Mapping[int, Words] = field(default_factory=dict)
     examine: Callable[[Array, Seen, Array], Mapping[str, Array]] | None = None
     inside: Inside | None = None
     below: Resolver[Any] | None = None
+    outside: Elsewhere | None = None
 
     def start(self, problem: VelocityProblem) -> None:
         """The kernel makes its own memory at the first step."""
@@ -142,8 +144,7 @@ class KernelResolver:
             failure: ControlFailure = below.failure(status, seen, memory[memory.size - below.memory_size :])
             return failure
         data = {"q": seen.q.copy()} if self.examine is None else self.examine(self.gains, seen, memory)
-        told = {of: text if isinstance(text, str) else text(seen) for of, text in self.failures.items()}
-        return failure_of(status, told, data)
+        return failure_of(status, self.failures, data, seen)
 
     def _resolution(self, problem: VelocityProblem, out: Resolved) -> Resolution:
         told, width = problem.command, sum(len(block.columns) for block in self.columns)

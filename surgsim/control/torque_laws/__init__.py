@@ -7,6 +7,7 @@ TORQUE_LAWS = Catalog(
     "surgsim.torque_laws",
     {
         "constraint_consistent": f"{__name__}.constraint_consistent:ConstraintConsistentConfig",
+        "external": f"{__name__}.external:ExternalLawConfig",
         "hierarchical_impedance": f"{__name__}.hierarchical_impedance:HierarchicalImpedanceConfig",
         "joint_elastic_dynamics": f"{__name__}.joint_elastic_dynamics:JointElasticDynamicsConfig",
         "joint_impedance": f"{__name__}.joint_impedance:JointImpedanceConfig",

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surgsim.catalog import PartConfig, Surroundings
-from surgsim.control.failure import ControlFailure, failure_of
-from surgsim.control.inside import Inside
+from surgsim.control.failure import ControlFailure, Words, failure_of
+from surgsim.control.inside import Elsewhere, Inside
 from surgsim.control.joining import Desk, furnish
 from surgsim.control.problem import Resolution
 from surgsim.control.rcm import Rcm
@@ -122,8 +122,10 @@ class KernelTorqueLaw:
         terms: Names of the terms, in the order of the rows of `out`.
         gains: The law's numbers, laid out as the kernel says; with something inside they begin with a `Head`.
         memory_size: Length of its memory, all zeros before the first tick.
-        failures: What each status of the kernel means, for the person who reads the outcome.
+        failures: What each status of the kernel means, for the person who reads the outcome: words, or a
+            function of what the kernel saw.
         inside: What the kernel enters in Python.
+        outside: What answers the kernel from outside surgsim, to be ended with the run.
     """
 
     kernel: TorqueKernel
@@ -131,8 +133,9 @@ class KernelTorqueLaw:
     terms: tuple[str, ...]
     gains: Array
     memory_size: int = 0
-    failures: Mapping[int, str] = field(default_factory=dict)
+    failures: Mapping[int, Words] = field(default_factory=dict)
     inside: Inside | None = None
+    outside: Elsewhere | None = None
 
     def start(self, problem: TorqueProblem) -> None:
         """The kernel makes its own memory at the first tick."""
@@ -158,7 +161,7 @@ class KernelTorqueLaw:
     def failure(self, status: int, seen: Seen) -> ControlFailure:
         """Why there is no answer."""
         data = {"q": seen.q.copy(), "v": seen.v.copy(), "M": seen.M.copy()}
-        return failure_of(status, self.failures, data)
+        return failure_of(status, self.failures, data, seen)
 
 
 def for_joints(key: str, given: Sequence[float] | None, profile: Sequence[float], n: int) -> Array:
