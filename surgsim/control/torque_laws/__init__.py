@@ -7,6 +7,7 @@ TORQUE_LAWS = Catalog(
     "surgsim.torque_laws",
     {
         "hierarchical_impedance": f"{__name__}.hierarchical_impedance:HierarchicalImpedanceConfig",
+        "hierarchical_qp": f"{__name__}.hierarchical_qp:HierarchicalQpConfig",
         "joint_elastic_dynamics": f"{__name__}.joint_elastic_dynamics:JointElasticDynamicsConfig",
         "joint_impedance": f"{__name__}.joint_impedance:JointImpedanceConfig",
         "policy": f"{__name__}.policy:PolicyLawConfig",
