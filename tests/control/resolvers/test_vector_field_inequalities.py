@@ -147,9 +147,7 @@ def test_the_sphere_holds_to_a_micrometre_while_the_port_moves(seed, alpha):
 
 def test_without_what_d_gains_over_a_period_it_does_not():
     """The row as printed: fast motion round the sphere leaves it, by T |e'|^2 / (2 R eta)."""
-    printed = [
-        travelled(VectorFieldInequalitiesConfig(alpha=1.0, sampled=False), s)[0].max() for s in range(4)
-    ]
+    printed = [travelled(VectorFieldInequalitiesConfig(alpha=1.0, sampled=False), s)[0].max() for s in (0, 2)]
     assert max(printed) > R + 1e-6
 
 

@@ -269,3 +269,11 @@ def test_following_the_gears_needs_a_short_period():
         surgsim.load(
             "circle_lwr4plus", controller="entry_sphere_qp", settings={"simulation.control_period_s": 0.005}
         )
+
+
+@pytest.mark.parametrize("controller", ["hierarchical_qp", "entry_sphere_qp"])
+def test_it_lives_in_the_theatre_on_real_drives(controller):
+    settings = {"task.duration_s": 2.0, "task.radius_m": 0.005}
+    trace = surgsim.run("theatre_fr3", controller=controller, settings=settings).trace
+    assert trace.meta.ending.outcome is Outcome.COMPLETED
+    assert 1e3 * trace["rcm_error_m"].max() < {"hierarchical_qp": 1.5, "entry_sphere_qp": 0.6}[controller]
