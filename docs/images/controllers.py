@@ -29,7 +29,9 @@ CONTROLLERS = (
     "rnn",
     "qp",
     "mink",
+    "vector_field_inequalities",
     "joint_impedance",
+    "hierarchical_qp",
     "rcm_inverse_dynamics",
     "self_motion",
 )

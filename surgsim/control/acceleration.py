@@ -103,19 +103,51 @@ def prioritised(
         GOES_ON, or INFEASIBLE if no acceleration keeps all limits.
     """
     n, m = posture.size, J.shape[0]
-    rows = np.empty((n + m, n))
-    lower, upper = np.empty(n + m), np.empty(n + m)
-    H, f, value = np.empty((n, n)), np.empty(n), np.empty(n + m)
+    rows, lower, upper = np.empty((n + m, n)), np.empty(2 * n + m), np.empty(2 * n + m)
+    rows[:n] = M
+    for i in range(n):
+        lower[i], upper[i] = low[i], high[i]
+        lower[n + i], upper[n + i] = -torque_limit[i] - constant[i], torque_limit[i] - constant[i]
+    return cascade(M, J, a, posture, rows, n, lower, upper, qddot)
+
+
+@compiled
+def cascade(
+    M: Array,
+    J: Array,
+    a: Array,
+    posture: Array,
+    rows: Array,
+    held: int,
+    lower: Array,
+    upper: Array,
+    qddot: Array,
+) -> int:
+    """The programs of `prioritised` under any limits: bounds of q'', and rows G q'' between bounds.
+
+    Args:
+        M: Inertia (n, n).
+        J: Tip rows, then RCM rows (3 or 5, n).
+        a: Their accelerations (3 or 5,).
+        posture: Acceleration of the posture (n,) [rad/s^2].
+        rows: G in its first `held` rows, then room for J (held + 3 or 5, n), which is written.
+        held: How many rows limits take.
+        lower: Lower bounds of q'', then of G q'', then room (n + held + 3 or 5,); changed by rounding.
+        upper: Upper bounds, likewise.
+        qddot: Filled with the joint acceleration (n,) [rad/s^2].
+
+    Returns:
+        GOES_ON, or INFEASIBLE if no acceleration keeps all limits.
+    """
+    n, m = posture.size, J.shape[0]
+    H, f, value = np.empty((n, n)), np.empty(n), np.empty(held + m)
     work, active, side = (
         np.zeros((2 * n + 7, n + 1)),
         np.zeros(n + 1, np.int64),
-        np.zeros(2 * n + m, np.int64),
+        np.zeros(n + held + m, np.int64),
     )
-    rows[:n] = M
-    least, most = low.copy(), high.copy()
-    for i in range(n):
-        lower[i], upper[i] = -torque_limit[i] - constant[i], torque_limit[i] - constant[i]
-    held = n
+    least, most = lower[:n], upper[:n]
+    below, above = lower[n:], upper[n:]
     for level in range(3):
         begin, end = (3, m) if level == 0 else (0, 3)
         if level < 2 and end == begin:
@@ -128,19 +160,19 @@ def prioritised(
             for i in range(n):
                 f[i] = -f[i]
         found = solve(
-            H, f, least, most, rows[:held], lower[:held], upper[:held], side[: n + held], qddot, work, active
+            H, f, least, most, rows[:held], below[:held], above[:held], side[: n + held], qddot, work, active
         )
         if found != SOLVED:
             return INFEASIBLE
         if level == 2:
             break
         times(rows[:held], qddot, value[:held])
-        _admit(value[:held], lower, upper)
+        _admit(value[:held], below, above)
         _admit(qddot, least, most)
         for i in range(begin, end):
             rows[held] = J[i]
             s = dot(J[i], qddot)
-            lower[held], upper[held] = s - _SLACK, s + _SLACK
+            below[held], above[held] = s - _SLACK, s + _SLACK
             held += 1
     return GOES_ON
 

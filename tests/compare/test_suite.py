@@ -275,7 +275,7 @@ def test_the_full_suite_leaves_nothing_out():
     }  # for the torque-level settings
     elsewhere |= {"external_torque", "external_velocity"}  # these need a program
     assert set(suite.controllers) == set(shipped("controllers")) - elsewhere
-    assert len(expand(suite, folder)) == 3600
+    assert len(expand(suite, folder)) == 4680
     assert len(expand(*load_suite("seeds"))) == 240
     assert len(expand(*load_suite("nominal"))) == 48
     assert len(expand(*load_suite("quick"))) == 36

@@ -16,6 +16,9 @@ RESOLVERS = Catalog(
         "qp": "surgsim.control.resolvers.qp:QpConfig",
         "rnn": "surgsim.control.resolvers.rnn:RnnConfig",
         "self_motion": "surgsim.control.resolvers.self_motion:SelfMotionConfig",
+        "vector_field_inequalities": (
+            "surgsim.control.resolvers.vector_field_inequalities:VectorFieldInequalitiesConfig"
+        ),
         "vprnn": "surgsim.control.resolvers.vprnn:VprnnConfig",
     },
 )

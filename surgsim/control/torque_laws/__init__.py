@@ -9,6 +9,7 @@ TORQUE_LAWS = Catalog(
         "constraint_consistent": f"{__name__}.constraint_consistent:ConstraintConsistentConfig",
         "external": f"{__name__}.external:ExternalLawConfig",
         "hierarchical_impedance": f"{__name__}.hierarchical_impedance:HierarchicalImpedanceConfig",
+        "hierarchical_qp": f"{__name__}.hierarchical_qp:HierarchicalQpConfig",
         "joint_elastic_dynamics": f"{__name__}.joint_elastic_dynamics:JointElasticDynamicsConfig",
         "joint_impedance": f"{__name__}.joint_impedance:JointImpedanceConfig",
         "null_space_basis": f"{__name__}.null_space_basis:NullSpaceBasisConfig",

@@ -74,20 +74,10 @@ def fill_task_errors(
 
 
 @compiled
-def task_accelerations(
+def _task_accelerations(
     gains: Array, seen: Seen, model: Model, late: float, share: float, J: Array, a: Array
 ) -> None:
-    """Fill rows J (m, n) and accelerations a (m,) of tip and RCM at `model`'s state, `late` [s] from now.
-
-    Args:
-        gains: Of `HIERARCHY_GAINS` entries, those of the tasks first.
-        seen: Command and trocar.
-        model: The arm's kinematics and motion.
-        late: How long from now `model` is [s].
-        share: Of the bandwidths that is used.
-        J: Filled: tip rows, then those of the RCM.
-        a: Filled: their accelerations [m/s^2], those of the tip alone without a trocar.
-    """
+    """Fill rows J (m, n) and accelerations a (m,) of tip and RCM at `model`'s state, `late` [s] from now."""
     error, rate, bias = scratch(5), scratch(5), scratch(5)
     m, square = a.size, share * share
     ahead = max(late - gains[SENSOR_DELAY], 0.0)
@@ -95,18 +85,6 @@ def task_accelerations(
     for i in range(m):
         stiffness, damping = (gains[K_TIP], gains[D_TIP]) if i < 3 else (gains[K_RCM], gains[D_RCM])
         a[i] = -bias[i] - (square * stiffness * error[i] + share * damping * rate[i])
-
-
-@compiled
-def posture_acceleration(
-    gains: Array, seen: Seen, model: Model, late: float, share: float, out: Array
-) -> None:
-    """Fill `out` (n,) with the acceleration towards the joint reference [rad/s^2]."""
-    ahead = max(late - gains[SENSOR_DELAY], 0.0)
-    for i in range(out.size):
-        gap = seen.q_ref[i] + ahead * seen.qdot_ref[i] - model.q[i]
-        turning = share * gains[D_JOINT] * (seen.qdot_ref[i] - model.v[i])
-        out[i] = share * share * gains[K_JOINT] * gap + turning
 
 
 @compiled
@@ -134,14 +112,37 @@ def _give_way(A: Array, f: Array, a: Array) -> bool:
 
 
 @compiled
+def fill_demand(
+    gains: Array, seen: Seen, model: Model, late: float, share: float, J: Array, a: Array, posture: Array
+) -> None:
+    """What the tasks ask for at `model`'s state, which is reached `late` [s] from now.
+
+    Args:
+        gains: They begin with those of the hierarchy.
+        seen: Command, joint reference and trocar of now.
+        model: The arm then.
+        late: How much later that is than now [s].
+        share: Share of the bandwidths that is used.
+        J: Filled with the rows of tip and RCM (3 or 5, n).
+        a: Filled with their accelerations (3 or 5,) [m/s^2].
+        posture: Filled with the posture's (n,) [rad/s^2].
+    """
+    _task_accelerations(gains, seen, model, late, share, J, a)
+    ahead = max(late - gains[SENSOR_DELAY], 0.0)
+    for i in range(posture.size):
+        gap = seen.q_ref[i] + ahead * seen.qdot_ref[i] - model.q[i]
+        turning = share * gains[D_JOINT] * (seen.qdot_ref[i] - model.v[i])
+        posture[i] = share * share * gains[K_JOINT] * gap + turning
+
+
+@compiled
 def fill_terms(
     gains: Array, seen: Seen, model: Model, late: float, d: Array, share: float, out: Array
 ) -> int:
     """Fill the terms of the torque for the state of `model`, which is reached `late` [s] from now."""
     n, m, M = seen.q.size, 3 + seen.rows, model.M
     J, a, posture = scratch_matrix(m, n), scratch(m), scratch(n)
-    task_accelerations(gains, seen, model, late, share, J, a)
-    posture_acceleration(gains, seen, model, late, share, posture)
+    fill_demand(gains, seen, model, late, share, J, a, posture)
     L, Y, A, force = scratch_matrix(n, n), scratch_matrix(m, n), scratch_matrix(m, m), scratch(m)
     L[:], Y[:] = M, J
     if not factor(L):

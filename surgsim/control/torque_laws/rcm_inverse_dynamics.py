@@ -132,36 +132,16 @@ def rcm_inverse_dynamics(gains: Array, seen: Seen, memory: Array, out: Array) ->
     Source: ours; the hierarchy is operational-space control (Khatib 1987), the observer the discrete form of
     a momentum observer (De Luca et al. 2006), the prediction one of the state over the dead time.
     """
-    n, dt, first, most = seen.q.size, seen.dt_s, seen.first != 0, int(gains[MOST_DELAY])
-    known, delayed = memory[: n * (n + 3)], memory[n * (n + 3) :]
-    ticks = estimate_delay(delayed, first, seen.tau, most, dt)
-    late = ticks * dt
-    share = min(1.0, gains[FULL_GAIN] / late) if ticks > 0 else 1.0
+    n, most = seen.q.size, int(gains[MOST_DELAY])
     touch, tau, d = scratch(n), scratch(n), scratch(n)
     touch[:] = 0.0
     if gains[YIELDS] != 0.0:
         transposed_times(seen.Jv_WT, seen.f_T, touch)
-    offset = torque_offset(delayed, most, n)
-    for i in range(n):
-        tau[i] = seen.tau[i] - (offset[i] - touch[i])
-    links = scratch_matrix(n, n)
-    links[:] = seen.M
-    for i in range(n):  # what is measured on real drives acts behind their motors
-        links[i, i] -= gains[MOTORS + i]
-    learnt = observe(known, first, links, seen.bias, seen.damping, seen.v, tau, share * gains[OBSERVER], dt)
-    for i in range(n):
-        d[i] = learnt[i] + touch[i]
-    model = seen.elsewhere
-    if ticks > 0:
-        q, v = scratch(n), scratch(n)
-        q[:], v[:] = seen.q, seen.v
-        if not predict(q, v, seen.M, seen.bias, d, seen.damping, delayed, ticks, dt):
-            return RANK_LOST
-        kinematics(model, q)
-        dynamics(model, v)
-    else:
-        copy_model(seen, model)
-    status = fill_terms(gains, seen, model, late, d, share, out)
+    late = foresee(gains[HIERARCHY_GAINS:], seen, memory, touch, d)
+    if late < 0.0:
+        return RANK_LOST
+    share = whole_share(gains[HIERARCHY_GAINS:], late)
+    status = fill_terms(gains, seen, seen.elsewhere, late, d, share, out)
     if status != GOES_ON:
         return status
     for i in range(n):
@@ -169,8 +149,57 @@ def rcm_inverse_dynamics(gains: Array, seen: Seen, memory: Array, out: Array) ->
         for k in range(out.shape[0]):
             s += out[k, i]
         tau[i] = min(max(s, -seen.tau_max[i]), seen.tau_max[i])
-    remember_command(delayed, most, tau)
+    remember_command(memory[n * (n + 3) :], most, tau)
     return GOES_ON
+
+
+@compiled
+def whole_share(numbers: Array, late: float) -> float:
+    """The share of all bandwidths that is used `late` [s] ahead; numbers as of `foresee`."""
+    share: float = min(1.0, numbers[FULL_GAIN - HIERARCHY_GAINS] / late) if late > 0.0 else 1.0
+    return share
+
+
+@compiled
+def foresee(numbers: Array, seen: Seen, memory: Array, touch: Array, d: Array) -> float:
+    """Evaluate `seen.elsewhere` where the arm will be when the next command acts; by how much later [s].
+
+    Args:
+        numbers: The law's own gains: observer, longest delay, full gain, motors (3 + n,).
+        seen: What is measured.
+        memory: Of the observer, then of the delay estimate, which `remember_command` tells of every command.
+        touch: Measured torque of the surroundings, which the observer need not find (n,) [N m].
+        d: Filled with the disturbance torque, `touch` in it (n,) [N m].
+
+    Returns:
+        The delay [s], or -1 if the inertia is none.
+    """
+    n, dt, first, most = seen.q.size, seen.dt_s, seen.first != 0, int(numbers[MOST_DELAY - HIERARCHY_GAINS])
+    known, delayed = memory[: n * (n + 3)], memory[n * (n + 3) :]
+    ticks = estimate_delay(delayed, first, seen.tau, most, dt)
+    late = ticks * dt
+    tau, offset = scratch(n), torque_offset(delayed, most, n)
+    for i in range(n):
+        tau[i] = seen.tau[i] - (offset[i] - touch[i])
+    links = scratch_matrix(n, n)
+    links[:] = seen.M
+    for i in range(n):  # what is measured on real drives acts behind their motors
+        links[i, i] -= numbers[MOTORS - HIERARCHY_GAINS + i]
+    gain = whole_share(numbers, late) * numbers[OBSERVER - HIERARCHY_GAINS]
+    learnt = observe(known, first, links, seen.bias, seen.damping, seen.v, tau, gain, dt)
+    for i in range(n):
+        d[i] = learnt[i] + touch[i]
+    model = seen.elsewhere
+    if ticks == 0:
+        copy_model(seen, model)
+        return late
+    q, v = scratch(n), scratch(n)
+    q[:], v[:] = seen.q, seen.v
+    if not predict(q, v, seen.M, seen.bias, d, seen.damping, delayed, ticks, dt):
+        return -1.0
+    kinematics(model, q)
+    dynamics(model, v)
+    return late
 
 
 @compiled

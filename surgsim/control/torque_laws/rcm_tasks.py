@@ -8,8 +8,7 @@ from surgsim.catalog import PartConfig
 from surgsim.compiled import compiled
 from surgsim.control.torque_laws.rcm_hierarchy import (
     HIERARCHY_GAINS,
-    posture_acceleration,
-    task_accelerations,
+    fill_demand,
 )
 from surgsim.tick.arrays import Seen
 from surgsim.tick.nominal import copy_model
@@ -68,7 +67,6 @@ def wanted(gains: Array, seen: Seen, J: Array, a: Array, posture: Array, h: Arra
     """
     model = seen.elsewhere
     copy_model(seen, model)
-    task_accelerations(gains, seen, model, 0.0, 1.0, J, a)
-    posture_acceleration(gains, seen, model, 0.0, 1.0, posture)
+    fill_demand(gains, seen, model, 0.0, 1.0, J, a, posture)
     for i in range(h.size):
         h[i] = seen.bias[i] + seen.damping[i] * seen.v[i]

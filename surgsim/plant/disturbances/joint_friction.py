@@ -50,7 +50,7 @@ class JointFrictionConfig(DisturbanceConfig):
         """Refuse links of real drives that hold better at rest: that friction is in the motors."""
         if self.static_nm is not None and scenario.has_drives:
             raise ValueError(
-                "joint_friction: static_nm is for ideal drives; on real ones the motors have the friction that "
+                "joint_friction: static_nm is for ideal drives; on real ones motors have the friction that "
                 "is greater at rest: give robot.drive.static_nm"
             )
 
