@@ -47,6 +47,7 @@ LAYERS = (
     "surgsim.report",
     "surgsim.adopt",
     "surgsim.studies",
+    "surgsim.export",
     "surgsim.contract",
     "surgsim.bench",
     "surgsim.cli",
@@ -57,7 +58,13 @@ LAYERS = (
 ONLY = {
     "rerun": ("surgsim.recording",),
     "pandas": ("surgsim.api", "surgsim.trace"),
-    "pyarrow": ("surgsim.api", "surgsim.compare", "surgsim.recording", "surgsim.studies"),
+    "pyarrow": (
+        "surgsim.api",
+        "surgsim.compare",
+        "surgsim.export",
+        "surgsim.recording",
+        "surgsim.studies",
+    ),
     "mujoco": (
         "surgsim.models",
         "surgsim.teleop",

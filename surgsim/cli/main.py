@@ -26,6 +26,7 @@ COMMANDS = (
     "tune",
     "report",
     "inspect",
+    "export",
     "reproduce",
     "bench",
     "adopt",

@@ -196,6 +196,8 @@ def again(command):
     """What is added to a command that is typed a second time in its folder."""
     if command == TWO:
         return "--out runs/two_wide"
+    if command.startswith("surgsim export "):
+        return "--force"
     return "--resume" if command.startswith(("surgsim compare ", "surgsim tune ")) else ""
 
 

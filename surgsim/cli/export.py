@@ -1,0 +1,70 @@
+"""`surgsim export`."""
+
+import argparse
+import json
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from surgsim.cli.paths import path_argument
+
+if TYPE_CHECKING:
+    from surgsim.export.subjects import Subject
+
+HELP = "take data out of runs, batches and studies"
+EXAMPLES = """RUN, BATCH and STUDY are paths, or names below runs/, runs/suites/ and results/. What is written
+follows from the file's suffix; several files can be written in one call.
+
+examples:
+  surgsim export circle_lwr4plus/vprnn-seed0 --data run.mat
+  surgsim export runs/quick --data runs.parquet
+"""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the command's arguments."""
+    parser.add_argument("names", nargs="+", metavar="RUN|BATCH|STUDY", help="what is exported")
+    parser.add_argument("--run", action="append", default=[], metavar="RUN_ID", help="a run of the batch")
+    _add_files(parser, "--data", "FILE.mat|.npz|.parquet", "every tick of a run, every run of a batch")
+    parser.add_argument("--study-table", metavar="NAME", help="which table of a study; default: its main one")
+    parser.add_argument("--force", action="store_true", help="replace files that are there")
+    parser.add_argument("--json", action="store_true", help="print JSON")
+
+
+def _add_files(parser: argparse.ArgumentParser, option: str, metavar: str, text: str) -> None:
+    parser.add_argument(option, type=path_argument, action="append", default=[], metavar=metavar, help=text)
+
+
+def execute(options: argparse.Namespace) -> int:
+    """Write every file that is asked for and print where it is."""
+    from surgsim.errors import SurgsimError
+    from surgsim.export.subjects import chosen, find
+
+    jobs = _jobs(options)
+    if not jobs:
+        raise SurgsimError("export: nothing to write: give --data")
+    subjects = chosen([find(name) for name in options.names], options.run)
+    written = []
+    for path, write in jobs:
+        write(path, subjects)
+        written.append({"file": str(path), "bytes": path.stat().st_size})
+        if not options.json:
+            print(f"{path}  {path.stat().st_size / 1024:.0f} KiB", flush=True)
+    if options.json:
+        print(json.dumps(written, indent=2))
+    return 0
+
+
+Job = tuple[Path, Callable[[Path, Sequence["Subject"]], None]]
+
+
+def _jobs(options: argparse.Namespace) -> list[Job]:
+    """What is to be written, each file checked."""
+    from surgsim.export import data
+    from surgsim.export.written import check_target
+
+    jobs: list[Job] = []
+    for path in options.data:
+        check_target("--data", path, data.SUFFIXES, force=options.force)
+        jobs.append((path, lambda path, subjects: data.write_data(path, subjects, options.study_table)))
+    return jobs
