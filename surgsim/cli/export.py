@@ -17,7 +17,8 @@ follows from the file's suffix; several files can be written in one call.
 
 examples:
   surgsim export circle_lwr4plus/vprnn-seed0 --data run.mat
-  surgsim export runs/quick --data runs.parquet
+  surgsim export runs/quick --data runs.parquet --table controllers.tex
+  surgsim export runs/quick --table forces.md --metric trocar_force_max_n,tip_error_rms_mm
 """
 
 
@@ -26,6 +27,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("names", nargs="+", metavar="RUN|BATCH|STUDY", help="what is exported")
     parser.add_argument("--run", action="append", default=[], metavar="RUN_ID", help="a run of the batch")
     _add_files(parser, "--data", "FILE.mat|.npz|.parquet", "every tick of a run, every run of a batch")
+    _add_files(parser, "--table", "FILE.tex|.md|.csv", "controllers of a batch, or runs, with their metrics")
+    parser.add_argument("--metric", default="", metavar="A,B", help="metrics of the table")
     parser.add_argument("--study-table", metavar="NAME", help="which table of a study; default: its main one")
     parser.add_argument("--force", action="store_true", help="replace files that are there")
     parser.add_argument("--json", action="store_true", help="print JSON")
@@ -42,7 +45,7 @@ def execute(options: argparse.Namespace) -> int:
 
     jobs = _jobs(options)
     if not jobs:
-        raise SurgsimError("export: nothing to write: give --data")
+        raise SurgsimError("export: nothing to write: give --data or --table")
     subjects = chosen([find(name) for name in options.names], options.run)
     written = []
     for path, write in jobs:
@@ -60,11 +63,17 @@ Job = tuple[Path, Callable[[Path, Sequence["Subject"]], None]]
 
 def _jobs(options: argparse.Namespace) -> list[Job]:
     """What is to be written, each file checked."""
-    from surgsim.export import data
+    from surgsim.export import data, table
     from surgsim.export.written import check_target
 
     jobs: list[Job] = []
     for path in options.data:
         check_target("--data", path, data.SUFFIXES, force=options.force)
         jobs.append((path, lambda path, subjects: data.write_data(path, subjects, options.study_table)))
+    metrics = [name.strip() for name in options.metric.split(",") if name.strip()]
+    for path in options.table:
+        check_target("--table", path, table.SUFFIXES, force=options.force)
+        jobs.append(
+            (path, lambda path, subjects: table.write_table(path, subjects, metrics, options.study_table))
+        )
     return jobs

@@ -1,7 +1,7 @@
 """What is exported: a run, a batch or a study, found by a name or a path."""
 
 import shlex
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -135,7 +135,9 @@ class StudySubject:
         name = table or self.tables[0]
         if name not in self.tables:
             raise SurgsimError(f"--study-table: {unknown_name(name, f'table of {self.path}', self.tables)}")
-        return name, list(read_csv(self.path / f"{name}.csv", _cell))
+        texts = read_csv(self.path / f"{name}.csv")
+        kinds = {key: _kind([row[key] for row in texts]) for key in texts[0]}
+        return name, [{key: kinds[key](text) if text else None for key, text in row.items()} for row in texts]
 
 
 Subject = RunSubject | BatchSubject | StudySubject
@@ -228,11 +230,13 @@ def _study_of(path: Path) -> StudySubject | None:
     return None
 
 
-def _cell(text: str) -> Cell:
-    """A cell of a study's table as it was before it became text."""
-    if text == "":
-        return None
-    try:
-        return float(text)
-    except ValueError:
-        return text
+def _kind(texts: Sequence[str]) -> Callable[[str], Cell]:
+    """What the cells of a study's column were before they became texts: whole numbers, numbers or texts."""
+    for kind in (int, float):
+        try:
+            for text in filter(None, texts):
+                kind(text)
+        except ValueError:
+            continue
+        return kind
+    return str
