@@ -87,7 +87,7 @@ ONLY = {
     "ruamel": ("surgsim.models.drive", "surgsim.scenario"),
     "argparse": ("surgsim.cli",),
     "rich": ("surgsim.cli",),
-    "matplotlib": ("surgsim.adopt", "surgsim.api", "surgsim.studies"),
+    "matplotlib": ("surgsim.adopt", "surgsim.api", "surgsim.export", "surgsim.studies"),
     "dm_control": ("surgsim.env",),
     "dm_env": ("surgsim.env",),
     "gymnasium": ("surgsim.env.gymnasium",),

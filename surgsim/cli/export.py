@@ -18,6 +18,7 @@ follows from the file's suffix; several files can be written in one call.
 examples:
   surgsim export circle_lwr4plus/vprnn-seed0 --data run.mat
   surgsim export runs/quick --data runs.parquet --table controllers.tex
+  surgsim export runs/one runs/other --figure errors.pdf --width page
   surgsim export runs/quick --table forces.md --metric trocar_force_max_n,tip_error_rms_mm
 """
 
@@ -28,7 +29,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--run", action="append", default=[], metavar="RUN_ID", help="a run of the batch")
     _add_files(parser, "--data", "FILE.mat|.npz|.parquet", "every tick of a run, every run of a batch")
     _add_files(parser, "--table", "FILE.tex|.md|.csv", "controllers of a batch, or runs, with their metrics")
-    parser.add_argument("--metric", default="", metavar="A,B", help="metrics of the table")
+    _add_files(parser, "--figure", "FILE.pdf|.svg|.png", "errors of runs over time, controllers of a batch")
+    parser.add_argument("--metric", default="", metavar="A,B", help="metrics of table and figure")
+    parser.add_argument(
+        "--width", choices=("column", "page"), default="column", help="of a figure: 3.5 or 7.2 inch"
+    )
     parser.add_argument("--study-table", metavar="NAME", help="which table of a study; default: its main one")
     parser.add_argument("--force", action="store_true", help="replace files that are there")
     parser.add_argument("--json", action="store_true", help="print JSON")
@@ -45,7 +50,7 @@ def execute(options: argparse.Namespace) -> int:
 
     jobs = _jobs(options)
     if not jobs:
-        raise SurgsimError("export: nothing to write: give --data or --table")
+        raise SurgsimError("export: nothing to write: give --data, --table or --figure")
     subjects = chosen([find(name) for name in options.names], options.run)
     written = []
     for path, write in jobs:
@@ -63,7 +68,7 @@ Job = tuple[Path, Callable[[Path, Sequence["Subject"]], None]]
 
 def _jobs(options: argparse.Namespace) -> list[Job]:
     """What is to be written, each file checked."""
-    from surgsim.export import data, table
+    from surgsim.export import data, figure, table
     from surgsim.export.written import check_target
 
     jobs: list[Job] = []
@@ -75,5 +80,10 @@ def _jobs(options: argparse.Namespace) -> list[Job]:
         check_target("--table", path, table.SUFFIXES, force=options.force)
         jobs.append(
             (path, lambda path, subjects: table.write_table(path, subjects, metrics, options.study_table))
+        )
+    for path in options.figure:
+        check_target("--figure", path, figure.SUFFIXES, force=options.force)
+        jobs.append(
+            (path, lambda path, subjects: figure.write_figure(path, subjects, metrics, options.width))
         )
     return jobs
