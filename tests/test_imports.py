@@ -65,6 +65,7 @@ ONLY = {
         "surgsim.recording",
         "surgsim.studies",
     ),
+    "av": ("surgsim.export.moving",),
     "mujoco": (
         "surgsim.models",
         "surgsim.teleop",

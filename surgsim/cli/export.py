@@ -1,7 +1,9 @@
 """`surgsim export`."""
 
 import argparse
+import ctypes.util
 import json
+import os
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -11,6 +13,7 @@ from surgsim.cli.paths import path_argument
 if TYPE_CHECKING:
     from surgsim.export.subjects import Subject
 
+_LEAST, _MOST = 0.01, 1000.0  # of --speed and --fps
 HELP = "take data out of runs, batches and studies"
 EXAMPLES = """RUN, BATCH and STUDY are paths, or names below runs/, runs/suites/ and results/. What is written
 follows from the file's suffix; several files can be written in one call.
@@ -19,6 +22,8 @@ examples:
   surgsim export circle_lwr4plus/vprnn-seed0 --data run.mat
   surgsim export runs/quick --data runs.parquet --table controllers.tex
   surgsim export runs/one runs/other --figure errors.pdf --width page
+  surgsim export runs/one --video run.mp4 --camera overview,inside,endoscope
+  surgsim export runs/one runs/other --video both.gif --speed 2
   surgsim export runs/quick --table forces.md --metric trocar_force_max_n,tip_error_rms_mm
 """
 
@@ -34,6 +39,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--width", choices=("column", "page"), default="column", help="of a figure: 3.5 or 7.2 inch"
     )
+    _add_files(parser, "--video", "FILE.mp4|.gif", "runs side by side, in step")
+    parser.add_argument(
+        "--camera",
+        default="overview",
+        metavar="A,B",
+        help="of a video: overview, port_closeup, inside, endoscope; default: overview",
+    )
+    parser.add_argument(
+        "--speed", type=float, default=1.0, metavar="X", help="of a video: 2 is twice as fast"
+    )
+    parser.add_argument("--fps", type=float, metavar="N", help="pictures a second; default: 25, of a GIF 10")
+    parser.add_argument("--size", metavar="WxH", help="of the video; default: 1280x720, of a GIF 480x270")
     parser.add_argument("--study-table", metavar="NAME", help="which table of a study; default: its main one")
     parser.add_argument("--force", action="store_true", help="replace files that are there")
     parser.add_argument("--json", action="store_true", help="print JSON")
@@ -45,12 +62,14 @@ def _add_files(parser: argparse.ArgumentParser, option: str, metavar: str, text:
 
 def execute(options: argparse.Namespace) -> int:
     """Write every file that is asked for and print where it is."""
+    if options.video:
+        draw_without_display()  # before anything imports MuJoCo
     from surgsim.errors import SurgsimError
     from surgsim.export.subjects import chosen, find
 
     jobs = _jobs(options)
     if not jobs:
-        raise SurgsimError("export: nothing to write: give --data, --table or --figure")
+        raise SurgsimError("export: nothing to write: give --data, --table, --figure or --video")
     subjects = chosen([find(name) for name in options.names], options.run)
     written = []
     for path, write in jobs:
@@ -86,4 +105,46 @@ def _jobs(options: argparse.Namespace) -> list[Job]:
         jobs.append(
             (path, lambda path, subjects: figure.write_figure(path, subjects, metrics, options.width))
         )
+    for path in options.video:
+        jobs.append((path, _video_job(path, options)))
     return jobs
+
+
+def _video_job(path: Path, options: argparse.Namespace) -> Callable[[Path, Sequence["Subject"]], None]:
+    """What writes a video, with what it needs checked."""
+    from surgsim.cli.output import show_count
+    from surgsim.errors import SurgsimError
+    from surgsim.export.moving import SUFFIXES, check_encoder
+    from surgsim.export.replayed import check_cameras
+    from surgsim.export.video import VideoSettings, parse_size, write_video
+    from surgsim.export.written import check_target
+
+    check_target("--video", path, SUFFIXES, force=options.force)
+    if path.suffix.lower() == ".mp4":
+        check_encoder("--video FILE.mp4")
+    cameras = tuple(name.strip() for name in options.camera.split(","))
+    check_cameras(cameras)
+    for option, value in (("--speed", options.speed), ("--fps", options.fps)):
+        if value is not None and not _LEAST <= value <= _MOST:
+            raise SurgsimError(f"{option}: {value:g} is not allowed: from {_LEAST:g} to {_MOST:g}")
+    size = parse_size(options.size) if options.size else None
+    settings = VideoSettings(cameras=cameras, speed=options.speed, fps=options.fps, size=size)
+
+    def write(path: Path, subjects: Sequence["Subject"]) -> None:
+        with show_count(f"drawing {path.name}", "pictures", quiet=options.json) as progress:
+            write_video(path, subjects, settings, progress)
+
+    return write
+
+
+def draw_without_display() -> None:
+    """Have MuJoCo draw by EGL or OSMesa where there is no display, unless the user says how it is to draw.
+
+    It looks at the variable when it is imported.
+    """
+    if "MUJOCO_GL" in os.environ or "DISPLAY" in os.environ:
+        return
+    for library, value in (("EGL", "egl"), ("OSMesa", "osmesa")):
+        if ctypes.util.find_library(library):
+            os.environ["MUJOCO_GL"] = value
+            return

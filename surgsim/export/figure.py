@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from surgsim.compare.leaderboard import leaderboard
 from surgsim.compare.observations import Observations, metric_named
 from surgsim.errors import SurgsimError
+from surgsim.export.names import told_apart
 from surgsim.export.paper_style import (
     SUFFIXES,
     colours,
@@ -116,7 +117,7 @@ def _error(ax: Any, runs: Sequence[RunSubject], column: str) -> None:
         ax.set_yticks([])
         return
     least = min(found) / _DECADES if max(found) > _LOGARITHMIC * min(found) else 0.0
-    names = _told_apart(runs)
+    names = told_apart(runs)
     for run, name, colour, stroke in zip(runs, names, colours(len(runs)), strokes(len(runs)), strict=True):
         values = run.trace[column] * _MM
         seen = np.log(np.maximum(values, least)) if least else values
@@ -154,18 +155,6 @@ def _limits(ax: Any, limits: Sequence[float | None], largest: Sequence[float]) -
         ax.set_ylim(low, max(high, (2.0 if ax.get_yscale() == "log" else 1.08) * limit))
     else:
         ax.set_title(f"limit {limit:g} mm", loc="right", fontsize=7, color="0.35", pad=2)
-
-
-def _told_apart(runs: Sequence[RunSubject]) -> list[str]:
-    """What is different of the runs: scenario, controller, seed, or all of these."""
-    named = [
-        (scenario, controller, f"seed {seed}") for scenario, controller, seed in (run.named for run in runs)
-    ]
-    parts = [part for part in range(3) if len({name[part] for name in named}) > 1] or [1]
-    names = [", ".join(name[part] for part in parts) for name in named]
-    if len({*names}) == len(names):
-        return names
-    return [f"{name} ({run.path.name})" for name, run in zip(names, runs, strict=True)]
 
 
 def _fitting(names: Sequence[str], letters: int) -> int:
