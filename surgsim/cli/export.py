@@ -13,6 +13,7 @@ from surgsim.cli.paths import path_argument
 if TYPE_CHECKING:
     from surgsim.export.subjects import Subject
 
+_EPISODE_SIZE = (320, 240)
 _LEAST, _MOST = 0.01, 1000.0  # of --speed and --fps
 HELP = "take data out of runs, batches and studies"
 EXAMPLES = """RUN, BATCH and STUDY are paths, or names below runs/, runs/suites/ and results/. What is written
@@ -24,6 +25,7 @@ examples:
   surgsim export runs/one runs/other --figure errors.pdf --width page
   surgsim export runs/one --video run.mp4 --camera overview,inside,endoscope
   surgsim export runs/one runs/other --video both.gif --speed 2
+  surgsim export runs/quick --lerobot episodes --camera endoscope,inside --action joint_velocity
   surgsim export runs/quick --table forces.md --metric trocar_force_max_n,tip_error_rms_mm
 """
 
@@ -44,13 +46,24 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--camera",
         default="overview",
         metavar="A,B",
-        help="of a video: overview, port_closeup, inside, endoscope; default: overview",
+        help="of videos and episodes: overview, port_closeup, inside, endoscope; default: overview",
     )
     parser.add_argument(
         "--speed", type=float, default=1.0, metavar="X", help="of a video: 2 is twice as fast"
     )
     parser.add_argument("--fps", type=float, metavar="N", help="pictures a second; default: 25, of a GIF 10")
-    parser.add_argument("--size", metavar="WxH", help="of the video; default: 1280x720, of a GIF 480x270")
+    parser.add_argument(
+        "--size",
+        metavar="WxH",
+        help="of the pictures; default: 1280x720, of a GIF 480x270, of episodes 320x240",
+    )
+    parser.add_argument("--lerobot", type=path_argument, metavar="DIR", help="runs as episodes to learn from")
+    parser.add_argument(
+        "--action", default="tip_velocity", metavar="KIND", help="tip_velocity, joint_velocity or torque"
+    )
+    parser.add_argument(
+        "--rate", type=float, metavar="HZ", help="steps a second; default: the policy's, or 50"
+    )
     parser.add_argument("--study-table", metavar="NAME", help="which table of a study; default: its main one")
     parser.add_argument("--force", action="store_true", help="replace files that are there")
     parser.add_argument("--json", action="store_true", help="print JSON")
@@ -62,24 +75,31 @@ def _add_files(parser: argparse.ArgumentParser, option: str, metavar: str, text:
 
 def execute(options: argparse.Namespace) -> int:
     """Write every file that is asked for and print where it is."""
-    if options.video:
+    if options.video or options.lerobot:
         draw_without_display()  # before anything imports MuJoCo
     from surgsim.errors import SurgsimError
     from surgsim.export.subjects import chosen, find
 
     jobs = _jobs(options)
     if not jobs:
-        raise SurgsimError("export: nothing to write: give --data, --table, --figure or --video")
+        raise SurgsimError("export: nothing to write: give --data, --table, --figure, --video or --lerobot")
     subjects = chosen([find(name) for name in options.names], options.run)
     written = []
     for path, write in jobs:
         write(path, subjects)
-        written.append({"file": str(path), "bytes": path.stat().st_size})
+        size = _size(path)
+        written.append({"file": str(path), "bytes": size})
         if not options.json:
-            print(f"{path}  {path.stat().st_size / 1024:.0f} KiB", flush=True)
+            print(f"{path}  {size / 1024:.0f} KiB", flush=True)
     if options.json:
         print(json.dumps(written, indent=2))
     return 0
+
+
+def _size(path: Path) -> int:
+    """Bytes of a file, or of all files in a folder."""
+    files = [path] if path.is_file() else [file for file in path.rglob("*") if file.is_file()]
+    return sum(file.stat().st_size for file in files)
 
 
 Job = tuple[Path, Callable[[Path, Sequence["Subject"]], None]]
@@ -107,6 +127,8 @@ def _jobs(options: argparse.Namespace) -> list[Job]:
         )
     for path in options.video:
         jobs.append((path, _video_job(path, options)))
+    if options.lerobot:
+        jobs.append((options.lerobot, _lerobot_job(options.lerobot, options)))
     return jobs
 
 
@@ -115,15 +137,15 @@ def _video_job(path: Path, options: argparse.Namespace) -> Callable[[Path, Seque
     from surgsim.cli.output import show_count
     from surgsim.errors import SurgsimError
     from surgsim.export.moving import SUFFIXES, check_encoder
-    from surgsim.export.replayed import check_cameras
     from surgsim.export.video import VideoSettings, parse_size, write_video
     from surgsim.export.written import check_target
 
     check_target("--video", path, SUFFIXES, force=options.force)
     if path.suffix.lower() == ".mp4":
         check_encoder("--video FILE.mp4")
-    cameras = tuple(name.strip() for name in options.camera.split(","))
-    check_cameras(cameras)
+    cameras = _cameras(options)
+    if not cameras:
+        raise SurgsimError("--video needs a --camera")
     for option, value in (("--speed", options.speed), ("--fps", options.fps)):
         if value is not None and not _LEAST <= value <= _MOST:
             raise SurgsimError(f"{option}: {value:g} is not allowed: from {_LEAST:g} to {_MOST:g}")
@@ -135,6 +157,45 @@ def _video_job(path: Path, options: argparse.Namespace) -> Callable[[Path, Seque
             write_video(path, subjects, settings, progress)
 
     return write
+
+
+def _lerobot_job(path: Path, options: argparse.Namespace) -> Callable[[Path, Sequence["Subject"]], None]:
+    """What writes a data set, with what it needs checked."""
+    from surgsim.cli.output import show_count
+    from surgsim.export.lerobot import check_lerobot, write_lerobot
+    from surgsim.export.moving import check_encoder
+    from surgsim.export.video import parse_size
+
+    check_lerobot(path, force=options.force)
+    cameras = _cameras(options)
+    if cameras:
+        check_encoder("--lerobot with pictures (--camera none leaves them out)")
+    size = parse_size(options.size) if options.size else _EPISODE_SIZE
+
+    def write(path: Path, subjects: Sequence["Subject"]) -> None:
+        with show_count(f"drawing {path.name}", "pictures", quiet=options.json or not cameras) as progress:
+            write_lerobot(
+                path,
+                subjects,
+                action=options.action,
+                rate_hz=options.rate,
+                cameras=cameras,
+                size=size,
+                progress=progress,
+            )
+
+    return write
+
+
+def _cameras(options: argparse.Namespace) -> tuple[str, ...]:
+    """The cameras that are named; `none` is none."""
+    from surgsim.export.replayed import check_cameras
+
+    cameras = tuple(name.strip() for name in options.camera.split(","))
+    if cameras == ("none",):
+        return ()
+    check_cameras(cameras)
+    return cameras
 
 
 def draw_without_display() -> None:

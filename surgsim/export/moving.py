@@ -1,6 +1,6 @@
 """Moving pictures in a file: MP4 by PyAV, which brings its encoder; GIF by Pillow."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from fractions import Fraction
 from pathlib import Path
@@ -17,7 +17,7 @@ NO_PYAV = "needs PyAV: pip install 'surgsim[video]'"
 _GIF_UNIT_S = Fraction(1, 100)
 _GIF_COLOURS = 256
 _CLOCK_HZ = 90_000
-_QUALITY = {"crf": "20", "preset": "medium"}
+_QUALITY: Mapping[str, str] = {"crf": "20", "preset": "medium"}
 
 
 class Film(Protocol):
@@ -73,13 +73,15 @@ class _Mp4:
 
 
 @contextmanager
-def mp4(draft: Path, period_s: float, size: tuple[int, int]) -> Iterator[Film]:
-    """H.264 in MP4, 4:2:0, which browsers and slides play."""
+def mp4(
+    draft: Path, period_s: float, size: tuple[int, int], quality: Mapping[str, str] = _QUALITY
+) -> Iterator[Film]:
+    """H.264 in MP4, 4:2:0, which browsers and slides play; `quality` are options of x264."""
     import av
 
     rate = Fraction(1.0 / period_s).limit_denominator(1000)
     with av.open(str(draft), "w", format="mp4", options={"movflags": "faststart"}) as container:
-        stream = container.add_stream("libx264", rate=rate, options=_QUALITY)
+        stream = container.add_stream("libx264", rate=rate, options=dict(quality))
         stream.width, stream.height = size
         stream.pix_fmt = "yuv420p"
         yield _Mp4(container, stream)

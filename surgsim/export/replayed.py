@@ -64,12 +64,14 @@ class Replayed:
         self._commanded = _line(trace.block("tip_ref"), np.arange(len(trace)), _COMMANDED, 3.0)
         self._rows = _path_rows(trace.block("tip"))
 
-    def picture(self, row: int, camera: str) -> Picture:
+    def picture(self, row: int, camera: str, *, paths: bool = True) -> Picture:
         """What a camera saw at a row of the trace, with the path commanded and that travelled so far."""
         self._replay.place(row)
         self._replay.aim()
         hidden = COVERS if camera in _THROUGH else ()
-        return self._drawing.picture(self._replay.data, camera, hidden, self._lines(row, camera))
+        return self._drawing.picture(
+            self._replay.data, camera, hidden, self._lines(row, camera) if paths else ()
+        )
 
     def _lines(self, row: int, camera: str) -> list[Line]:
         if camera == "overview":  # the patient is before them

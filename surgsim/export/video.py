@@ -121,10 +121,11 @@ def write_video(
 
 def picture_times(end_s: float, step_s: float) -> Array:
     """Times of the run that are shown (n,) [s]: every `step_s` from 0 on, and its end."""
-    times: Array = step_s * np.arange(int(end_s / step_s + 1e-9) + 1)
+    count = int(end_s / step_s + 1e-9) + 1
+    times = [step_s * k for k in range(count)]
     if end_s - times[-1] > 1e-9 * max(1.0, end_s):
-        times = np.concatenate([times, [end_s]])
-    return times
+        times.append(end_s)
+    return np.array(times)
 
 
 def grid_of(runs: int, cameras: int, size: tuple[int, int]) -> tuple[int, int]:

@@ -3,6 +3,8 @@
 import importlib.util
 from pathlib import Path
 
+import mujoco
+import numpy as np
 import pytest
 
 from surgsim.cli.main import main
@@ -50,3 +52,31 @@ def told(capsys):
         return status, capsys.readouterr().err
 
     return call
+
+
+class Blind(mujoco.Renderer):
+    """MuJoCo's renderer without OpenGL: it makes the scene, and pictures that tell its time and camera."""
+
+    seen: list = []  # noqa: RUF012
+
+    def __init__(self, model, height, width, max_geom):
+        self._gl_context = self._mjr_context = None
+        self._model, self._height, self._width = model, height, width
+        self._scene = mujoco.MjvScene(model=model, maxgeom=max_geom)
+        self._scene_option = mujoco.MjvOption()
+
+    def update_scene(self, data, camera=-1, scene_option=None):
+        super().update_scene(data, camera, scene_option)
+        self.asked = (data.qpos.copy(), camera, self._scene.ngeom)
+
+    def render(self, *, out=None):
+        Blind.seen.append((self, *self.asked, self._scene.ngeom))
+        return np.full((self._height, self._width, 3), 40 * len(Blind.seen) % 256, dtype=np.uint8)
+
+
+@pytest.fixture
+def blind(monkeypatch):
+    """What was drawn: renderer, joint positions, camera, geoms without and with lines."""
+    monkeypatch.setattr(mujoco, "Renderer", Blind)
+    monkeypatch.setattr(Blind, "seen", [])
+    return Blind.seen

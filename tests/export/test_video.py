@@ -4,7 +4,6 @@ import os
 import subprocess
 import sys
 
-import mujoco
 import numpy as np
 import pytest
 from PIL import Image, ImageSequence
@@ -25,34 +24,6 @@ from surgsim.export.video import (
 from surgsim.models.drawing import widened
 from surgsim.recording.eyes import COVERS
 from surgsim.runs.stop import Stopped
-
-
-class Blind(mujoco.Renderer):
-    """MuJoCo's renderer without OpenGL: it makes the scene, and pictures that tell its time and camera."""
-
-    seen: list = []  # noqa: RUF012
-
-    def __init__(self, model, height, width, max_geom):
-        self._gl_context = self._mjr_context = None
-        self._model, self._height, self._width = model, height, width
-        self._scene = mujoco.MjvScene(model=model, maxgeom=max_geom)
-        self._scene_option = mujoco.MjvOption()
-
-    def update_scene(self, data, camera=-1, scene_option=None):
-        super().update_scene(data, camera, scene_option)
-        self.asked = (data.qpos.copy(), camera, self._scene.ngeom)
-
-    def render(self, *, out=None):
-        Blind.seen.append((self, *self.asked, self._scene.ngeom))
-        return np.full((self._height, self._width, 3), 40 * len(Blind.seen) % 256, dtype=np.uint8)
-
-
-@pytest.fixture
-def blind(monkeypatch):
-    """What was drawn: renderer, joint positions, camera, geoms without and with lines."""
-    monkeypatch.setattr(mujoco, "Renderer", Blind)
-    monkeypatch.setattr(Blind, "seen", [])
-    return Blind.seen
 
 
 @pytest.fixture
