@@ -26,6 +26,7 @@ examples:
   surgsim export runs/one --video run.mp4 --camera overview,inside,endoscope
   surgsim export runs/one runs/other --video both.gif --speed 2
   surgsim export runs/quick --lerobot episodes --camera endoscope,inside --action joint_velocity
+  surgsim export runs/quick --minari quick-v0
   surgsim export runs/quick --table forces.md --metric trocar_force_max_n,tip_error_rms_mm
 """
 
@@ -58,6 +59,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="of the pictures; default: 1280x720, of a GIF 480x270, of episodes 320x240",
     )
     parser.add_argument("--lerobot", type=path_argument, metavar="DIR", help="runs as episodes to learn from")
+    parser.add_argument("--minari", type=path_argument, metavar="NAME-vN", help="the same for Minari")
     parser.add_argument(
         "--action", default="tip_velocity", metavar="KIND", help="tip_velocity, joint_velocity or torque"
     )
@@ -82,7 +84,9 @@ def execute(options: argparse.Namespace) -> int:
 
     jobs = _jobs(options)
     if not jobs:
-        raise SurgsimError("export: nothing to write: give --data, --table, --figure, --video or --lerobot")
+        raise SurgsimError(
+            "export: nothing to write: give --data, --table, --figure, --video, --lerobot or --minari"
+        )
     subjects = chosen([find(name) for name in options.names], options.run)
     written = []
     for path, write in jobs:
@@ -129,6 +133,8 @@ def _jobs(options: argparse.Namespace) -> list[Job]:
         jobs.append((path, _video_job(path, options)))
     if options.lerobot:
         jobs.append((options.lerobot, _lerobot_job(options.lerobot, options)))
+    if options.minari:
+        jobs.append((options.minari, _minari_job(options)))
     return jobs
 
 
@@ -185,6 +191,14 @@ def _lerobot_job(path: Path, options: argparse.Namespace) -> Callable[[Path, Seq
             )
 
     return write
+
+
+def _minari_job(options: argparse.Namespace) -> Callable[[Path, Sequence["Subject"]], None]:
+    """What writes a data set for Minari, with its folder checked."""
+    from surgsim.export.minari import check_minari, write_minari
+
+    check_minari(options.minari, force=options.force)
+    return lambda path, subjects: write_minari(path, subjects, action=options.action, rate_hz=options.rate)
 
 
 def _cameras(options: argparse.Namespace) -> tuple[str, ...]:

@@ -1,6 +1,6 @@
 """A recorded run as an episode of steps: what a policy saw, did and got, at the policy's rate."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal, get_args
 
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from surgsim.env.environment import DECIMATION
 from surgsim.env.rewards import reward
 from surgsim.errors import SurgsimError, unknown_name
-from surgsim.export.subjects import RunSubject
+from surgsim.export.subjects import BatchSubject, RunSubject, Subject
 from surgsim.recording.scene import scenario_of
 from surgsim.trace.trace import Trace
 
@@ -146,3 +146,46 @@ def _rewards(trace: Trace, rows: NDArray[np.intp]) -> Array:
     tip, rcm = trace["tip_error_m"][rows], trace["rcm_error_m"][rows]
     defined = bool(np.isfinite(rcm).any())
     return np.array([reward(float(t), float(r) if defined else None) for t, r in zip(tip, rcm, strict=True)])
+
+
+def runs_of(subjects: Sequence[Subject]) -> list[RunSubject]:
+    """The runs given, and every run of the batches given.
+
+    Raises:
+        SurgsimError: If something else is given.
+    """
+    found: list[RunSubject] = []
+    for subject in subjects:
+        if isinstance(subject, BatchSubject):
+            found += [subject.run(str(row["run_id"])) for row in subject.results.rows]
+        elif isinstance(subject, RunSubject):
+            found.append(subject)
+        else:
+            raise SurgsimError("episodes are of runs and batches, not of a study")
+    return found
+
+
+def check_alike(episodes: Sequence[Episode]) -> None:
+    """Refuse runs that have not the same columns, arm and rate.
+
+    Raises:
+        SurgsimError: If two differ, with what they differ in.
+    """
+    first = episodes[0]
+    for other in episodes[1:]:
+        for what, one, two in (
+            ("arm", first.robot, other.robot),
+            ("rate", first.rate_hz, other.rate_hz),
+            ("columns", first.state_names, other.state_names),
+        ):
+            if one != two:
+                raise SurgsimError(
+                    f"{first.run.path} and {other.run.path} differ in their {what}: a data set has one"
+                )
+
+
+def origin_of(episode: Episode) -> dict[str, Any]:
+    """Where an episode comes from, as data for JSON."""
+    scenario, controller, seed = episode.run.named
+    told = {"scenario": scenario, "controller": controller, "seed": seed}
+    return {**told, "outcome": episode.run.outcome, "success": episode.success}

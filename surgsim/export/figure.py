@@ -147,7 +147,7 @@ def _limit(run: RunSubject, key: str) -> float | None:
 def _limits(ax: Any, limits: Sequence[float | None], largest: Sequence[float]) -> None:
     """The limit that the runs share, as a line if they come near it, else in words above the axis."""
     limit = limits[0]
-    if limit is None or any(other != limit for other in limits):
+    if limit is None or any(other != limit for other in limits) or max(largest) == 0.0:
         return
     if max(largest) > _NEAR * limit or ax.get_yscale() == "log":
         ax.axhline(limit, color="black", linewidth=0.8, linestyle=(0, (5, 2)), label="limit")

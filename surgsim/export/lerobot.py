@@ -14,11 +14,11 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from surgsim.errors import SurgsimError
-from surgsim.export.episodes import Action, Episode, episode_of
+from surgsim.export.episodes import Action, Episode, check_alike, episode_of, origin_of, runs_of
 from surgsim.export.feature_stats import PictureStats, Stats, vector_stats
 from surgsim.export.moving import mp4
 from surgsim.export.replayed import replayed
-from surgsim.export.subjects import BatchSubject, RunSubject, Subject
+from surgsim.export.subjects import Subject
 from surgsim.recording.files import write_file
 from surgsim.runs.folder import whole_folder
 
@@ -49,23 +49,6 @@ def check_lerobot(folder: Path, *, force: bool) -> None:
         raise SurgsimError(f"--lerobot {folder}: is no LeRobot data set, and is not replaced")
 
 
-def runs_of(subjects: Sequence[Subject]) -> list[RunSubject]:
-    """The runs given, and every run of the batches given.
-
-    Raises:
-        SurgsimError: If something else is given.
-    """
-    found: list[RunSubject] = []
-    for subject in subjects:
-        if isinstance(subject, BatchSubject):
-            found += [subject.run(str(row["run_id"])) for row in subject.results.rows]
-        elif isinstance(subject, RunSubject):
-            found.append(subject)
-        else:
-            raise SurgsimError("episodes are of runs and batches, not of a study")
-    return found
-
-
 def write_lerobot(
     folder: Path,
     subjects: Sequence[Subject],
@@ -91,24 +74,9 @@ def write_lerobot(
         SurgsimError: If the runs do not go together, one was not recorded, or the disk refuses.
     """
     episodes = [episode_of(run, action, rate_hz) for run in runs_of(subjects)]
-    _check_alike(episodes)
+    check_alike(episodes)
     with whole_folder(folder) as draft:
         _write(draft, episodes, cameras, size, progress)
-
-
-def _check_alike(episodes: Sequence[Episode]) -> None:
-    """Refuse runs that have not the same columns, arm and rate."""
-    first = episodes[0]
-    for other in episodes[1:]:
-        for what, one, two in (
-            ("arm", first.robot, other.robot),
-            ("rate", first.rate_hz, other.rate_hz),
-            ("columns", first.state_names, other.state_names),
-        ):
-            if one != two:
-                raise SurgsimError(
-                    f"{first.run.path} and {other.run.path} differ in their {what}: a data set has one"
-                )
 
 
 def _write(
@@ -255,16 +223,7 @@ def _write_meta(
     stats = {name: {key: value.tolist() for key, value in one.items()} for name, one in whole.items()}
     _write_json(root / "meta" / "stats.json", stats)
     _write_json(root / INFO, info_of(episodes, len(tasks), list(pictures), size))
-    told = [
-        {
-            "scenario": episode.run.named[0],
-            "controller": episode.run.named[1],
-            "seed": episode.run.named[2],
-            "outcome": episode.run.outcome,
-            "success": episode.success,
-        }
-        for episode in episodes
-    ]
+    told = [origin_of(episode) for episode in episodes]
     _write_json(root / "meta" / "surgsim.json", {"episodes": told})
 
 

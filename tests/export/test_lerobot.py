@@ -10,9 +10,9 @@ import pyarrow.parquet as pq
 import pytest
 
 from surgsim.errors import SurgsimError
-from surgsim.export.episodes import _asked_every, episode_of
+from surgsim.export.episodes import _asked_every, check_alike, episode_of
 from surgsim.export.feature_stats import PictureStats, vector_stats
-from surgsim.export.lerobot import _check_alike, write_lerobot
+from surgsim.export.lerobot import write_lerobot
 
 ARROW = {"float32": pa.float32(), "int64": pa.int64(), "bool": pa.bool_()}
 STATISTICS = {"min", "max", "mean", "std", "count", "q01", "q10", "q50", "q90", "q99"}
@@ -151,7 +151,7 @@ def test_runs_that_make_no_data_set(run, run_folder, unrecorded, told, tmp_path)
         episode_of(run, "velocity")
     one = episode_of(run)
     with pytest.raises(SurgsimError, match="differ in their arm: a data set has one"):
-        _check_alike([one, replace(one, robot="panda")])
+        check_alike([one, replace(one, robot="panda")])
     out, none = tmp_path / "set", ("--camera", "none")
     assert "a run without recording" in told(unrecorded, "--lerobot", out, *none)[1]
     assert list(tmp_path.iterdir()) == []
