@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 _EPISODE_SIZE = (320, 240)
 _LEAST, _MOST = 0.01, 1000.0  # of --speed and --fps
-HELP = "take data out of runs, batches and studies"
+HELP = "take data, tables, figures, videos and episodes out of runs"
 EXAMPLES = """RUN, BATCH and STUDY are paths, or names below runs/, runs/suites/ and results/. What is written
 follows from the file's suffix; several files can be written in one call.
 
@@ -25,9 +25,9 @@ examples:
   surgsim export runs/one runs/other --figure errors.pdf --width page
   surgsim export runs/one --video run.mp4 --camera overview,inside,endoscope
   surgsim export runs/one runs/other --video both.gif --speed 2
-  surgsim export runs/quick --lerobot episodes --camera endoscope,inside --action joint_velocity
-  surgsim export runs/quick --minari quick-v0
-  surgsim export runs/quick --table forces.md --metric trocar_force_max_n,tip_error_rms_mm
+  surgsim export runs/quick --lerobot episodes --camera endoscope,inside
+  surgsim export runs/quick --minari quick-v0 --action torque
+  surgsim export runs/quick --table forces.md --metric trocar_force_max_n
 """
 
 
@@ -61,7 +61,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--lerobot", type=path_argument, metavar="DIR", help="runs as episodes to learn from")
     parser.add_argument("--minari", type=path_argument, metavar="NAME-vN", help="the same for Minari")
     parser.add_argument(
-        "--action", default="tip_velocity", metavar="KIND", help="tip_velocity, joint_velocity or torque"
+        "--action",
+        choices=("tip_velocity", "joint_velocity", "torque"),
+        default="tip_velocity",
+        help="what an episode's action is",
     )
     parser.add_argument(
         "--rate", type=float, metavar="HZ", help="steps a second; default: the policy's, or 50"
