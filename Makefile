@@ -4,7 +4,7 @@ ROOT := $(patsubst %/,%,$(dir $(abspath $(lastword $(MAKEFILE_LIST)))))
 VENV := $(ROOT)/.venv
 PY := $(VENV)/bin/python
 PYTHON ?= $(shell command -v python3.11 || command -v python3)
-EXTRAS := dev,gymnasium,pandas,ray,bench
+EXTRAS := dev,gymnasium,pandas,ray,bench,video
 RUN := runs/circle_lwr4plus/vprnn-seed0
 # Each process of the tests begins at its own half and takes from the other's end when it is through: so tests of one
 # file, which share what they make first, and the kernels that they compile, stay together.

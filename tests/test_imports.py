@@ -47,6 +47,7 @@ LAYERS = (
     "surgsim.report",
     "surgsim.adopt",
     "surgsim.studies",
+    "surgsim.export",
     "surgsim.contract",
     "surgsim.bench",
     "surgsim.cli",
@@ -57,7 +58,14 @@ LAYERS = (
 ONLY = {
     "rerun": ("surgsim.recording",),
     "pandas": ("surgsim.api", "surgsim.trace"),
-    "pyarrow": ("surgsim.api", "surgsim.compare", "surgsim.recording", "surgsim.studies"),
+    "pyarrow": (
+        "surgsim.api",
+        "surgsim.compare",
+        "surgsim.export",
+        "surgsim.recording",
+        "surgsim.studies",
+    ),
+    "av": ("surgsim.export.moving",),
     "mujoco": (
         "surgsim.models",
         "surgsim.teleop",
@@ -80,7 +88,7 @@ ONLY = {
     "ruamel": ("surgsim.models.drive", "surgsim.scenario"),
     "argparse": ("surgsim.cli",),
     "rich": ("surgsim.cli",),
-    "matplotlib": ("surgsim.adopt", "surgsim.api", "surgsim.studies"),
+    "matplotlib": ("surgsim.adopt", "surgsim.api", "surgsim.export", "surgsim.studies"),
     "dm_control": ("surgsim.env",),
     "dm_env": ("surgsim.env",),
     "gymnasium": ("surgsim.env.gymnasium",),

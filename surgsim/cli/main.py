@@ -27,6 +27,7 @@ COMMANDS = (
     "tune",
     "report",
     "inspect",
+    "export",
     "reproduce",
     "bench",
     "adopt",

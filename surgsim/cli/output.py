@@ -208,15 +208,12 @@ def print_leaderboard(metric: str, rows: "Sequence[LeaderboardRow]", points: int
             return number(figure.value, 3)
         return f"{number(figure.value, 3)} [{number(figure.low, 3)}, {number(figure.high, 3)}]"
 
-    from surgsim.compare.failures import counted_outcomes
     from surgsim.metrics.catalog import METRICS
 
     def cells(row: "LeaderboardRow") -> tuple[str, ...]:
-        undone = f"{row.not_done} not done" if row.not_done else ""
-        failed = ", ".join(filter(None, (counted_outcomes(row.failures), undone))) or "none"
         place = str(row.place or "-")
         rank = number(row.rank.value, 3)
-        return (row.controller, place, failed, str(row.runs), interval(row.value), rank)
+        return (row.controller, place, row.failed_words, str(row.runs), interval(row.value), rank)
 
     table = [cells(row) for row in rows]
     header = ("controller", "place", "failed", "runs", "IQM [95 %]", "mean rank")

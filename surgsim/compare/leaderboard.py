@@ -8,6 +8,7 @@ import numpy as np
 import pyarrow as pa
 
 from surgsim.compare.aggregates import iqm_interval, mean_rank, ranks, scores
+from surgsim.compare.failures import counted_outcomes
 from surgsim.compare.intervals import Interval
 from surgsim.compare.observations import COMPLETED, Observations, metric_named
 from surgsim.compare.places import places_of
@@ -44,6 +45,12 @@ class LeaderboardRow:
     score: Interval
     rank: Interval
     place: int | None = None
+
+    @property
+    def failed_words(self) -> str:
+        """Failures by outcome, and completed runs that did not do their task; `none` without any."""
+        undone = f"{self.not_done} not done" if self.not_done else ""
+        return ", ".join(filter(None, (counted_outcomes(self.failures), undone))) or "none"
 
 
 def leaderboard(table: pa.Table | Observations, metric: str, *, places: bool = True) -> list[LeaderboardRow]:

@@ -32,14 +32,19 @@ def render(
     data = mujoco.MjData(scene.model)
     data.qpos[scene.qpos_ids] = q
     mujoco.mj_forward(scene.model, data)
-    with _renderer(scene.model, width, height) as renderer:
-        renderer.update_scene(data, camera)
-        return np.array(renderer.render(), dtype=np.uint8)
+    with renderer(scene.model, width, height) as drawing:
+        drawing.update_scene(data, camera)
+        return np.array(drawing.render(), dtype=np.uint8)
 
 
-def _renderer(model: mujoco.MjModel, width: int, height: int) -> mujoco.Renderer:
+def renderer(model: mujoco.MjModel, width: int, height: int, most_geoms: int = 10_000) -> mujoco.Renderer:
+    """MuJoCo's renderer.
+
+    Raises:
+        SurgsimError: If the picture is too large, or this machine cannot draw.
+    """
     try:
-        return mujoco.Renderer(model, height=height, width=width)
+        return mujoco.Renderer(model, height=height, width=width, max_geom=most_geoms)
     except ValueError as error:
         raise SurgsimError(f"picture: {width}x{height} pixels: {error}") from error
     except (mujoco.FatalError, ImportError, AttributeError, OSError, RuntimeError) as error:

@@ -17,7 +17,8 @@ _BACKGROUND = (132, 142, 148)
 _SMALLEST_PATH_M = 0.012
 _PATH_RADII = 3.4  # distance of the inner eye from the path's middle
 _STEEPNESS = 1.1  # of the inner eye's look, along the shaft over across it
-_COVERS = ("abdomen", "skin", "drape", "cap")  # of the patient: what the inner eye looks through
+COVERS = ("abdomen", "skin", "drape", "cap")
+"""Materials of the patient that the inner eye looks through."""
 
 
 def scene_view(
@@ -41,15 +42,11 @@ def inside_view(scenario: Scenario, trace: Trace, *, below: str = "") -> rrb.Spa
     What covers the patient is left out, so that it hides nothing should the eye be above it.
     """
     scene = f"/{below}{SCENE}"
-    middle, radius = _path(trace)
-    up = _focus(scenario, trace) - middle
-    up = unit(up) if np.linalg.norm(up) > 1e-6 else np.array([0.0, 0.0, 1.0])
-    aside = unit(_from_base(scenario, middle, _ASIDE))
-    eye = middle + _PATH_RADII * radius * unit(_STEEPNESS * up + aside)
+    eye, middle = inside_eye(scenario, trace)
     return rrb.Spatial3DView(
         name="Inside. Path: desired blue, actual black",
         origin=scene,
-        contents=[f"+ {scene}/**", *(f"- {scene}/patient/{cover}/**" for cover in _COVERS)],
+        contents=[f"+ {scene}/**", *(f"- {scene}/patient/{cover}/**" for cover in COVERS)],
         background=_BACKGROUND,
         line_grid=not scenario.theatre,
         eye_controls=_eye(eye, middle),
@@ -58,6 +55,15 @@ def inside_view(scenario: Scenario, trace: Trace, *, below: str = "") -> rrb.Spa
             f"{scene}/{ACTUAL_PATH}": rr.LineStrips3D.from_fields(radii=rr.Radius.ui_points(1.5)),
         },
     )
+
+
+def inside_eye(scenario: Scenario, trace: Trace) -> tuple[Array, Array]:
+    """Where the inner eye is (3,) [m], and the middle of the path (3,) [m], at which it looks."""
+    middle, radius = _path(trace)
+    up = _focus(scenario, trace) - middle
+    up = unit(up) if np.linalg.norm(up) > 1e-6 else np.array([0.0, 0.0, 1.0])
+    aside = unit(_from_base(scenario, middle, _ASIDE))
+    return middle + _PATH_RADII * radius * unit(_STEEPNESS * up + aside), middle
 
 
 def _eye(position: Array, target: Array) -> rrb.EyeControls3D:

@@ -8,9 +8,9 @@ import numpy as np
 import rerun as rr
 
 from surgsim.models.build import Scene, build
-from surgsim.plant.other_joints import joint_columns
 from surgsim.recording import palette
 from surgsim.recording.layout import SCENE, TIMELINE, timestamps
+from surgsim.recording.replay import Replay
 from surgsim.recording.shapes import Triangles, geom_triangles, joined
 from surgsim.scenario.schema import Scenario
 from surgsim.spatial import nearest_on_line
@@ -72,23 +72,12 @@ class Poses:
 
 def body_poses(scene: Scene, trace: Trace, rows: np.ndarray[tuple[int], np.dtype[np.intp]]) -> Poses:
     """Forward kinematics at `rows` of the trace; the port follows the trocar."""
-    model = scene.model
-    data = mujoco.MjData(model)
-    mujoco.mj_kinematics(model, data)
-    q, trocar = trace.block("q")[rows], trace.block("trocar")[rows]
-    blocks, places = joint_columns(model)
-    others = np.column_stack([np.zeros((len(rows), 0)), *(trace.block(block.name)[rows] for block in blocks)])
-    port = None if scene.port_mocap is None else data.mocap_pos[scene.port_mocap]
-    offset = np.zeros(3) if port is None else port - data.site_xpos[scene.trocar_site]
-    position = np.empty((len(rows), model.nbody, 3))
-    quaternion = np.empty((len(rows), model.nbody, 4))
-    for i in range(len(rows)):
-        data.qpos[scene.qpos_ids] = q[i]
-        data.qpos[places] = others[i]
-        if port is not None:
-            port[:] = trocar[i] + offset
-        mujoco.mj_kinematics(model, data)
-        position[i], quaternion[i] = data.xpos, data.xquat
+    replay = Replay(scene, trace)
+    position = np.empty((len(rows), scene.model.nbody, 3))
+    quaternion = np.empty((len(rows), scene.model.nbody, 4))
+    for i, row in enumerate(rows):
+        replay.place(int(row))
+        position[i], quaternion[i] = replay.data.xpos, replay.data.xquat
     return Poses(position, quaternion)
 
 

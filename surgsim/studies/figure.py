@@ -8,15 +8,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-VERMILLION, BLUE, GREEN, PURPLE, ORANGE, BLACK = (
-    "#D55E00",
-    "#0072B2",
-    "#009E73",
-    "#CC79A7",
-    "#E69F00",
-    "#000000",
+from surgsim.recording import palette
+
+VERMILLION, BLUE, GREEN, PURPLE, ORANGE, BLACK = map(
+    palette.hexadecimal,
+    (palette.VERMILION, palette.BLUE, palette.GREEN, palette.PINK, palette.ORANGE, palette.BLACK),
 )
-"""Colours of Okabe and Ito."""
+"""Colours of Okabe and Ito, as matplotlib takes them."""
 
 Axes = Any
 

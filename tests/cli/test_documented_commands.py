@@ -83,6 +83,7 @@ SHORTER = {
     "--seeds 0:3": f"{SHORT} --seeds 0:1",
     "surgsim adopt desk_arm.xml --flange tool "
     "--set 'limits.velocity_rad_per_s=[2, 2, 2, 2, 3, 3, 3]'": "--quick",
+    "surgsim export runs/vprnn runs/pinv --video runs.gif --speed 2": "--fps 1 --size 96x64",
     "surgsim bench": "--duration 3",
     "surgsim bench --only ticks,stages --cases circle/vprnn,kinematic/pinv": "--duration 3",
     "surgsim bench --only libraries --json": "--duration 3",
@@ -151,7 +152,8 @@ def cases(slow):
                 yield pytest.param(page, [command], id=command.replace("/", "_"))
         rest = [command for command in here if not command.startswith(SLOW)]
         if rest and not slow:
-            yield pytest.param(page, rest, id=str(page.relative_to(ROOT)).replace("/", "_"))
+            drawn = [pytest.mark.needs("opengl")] if any(" --video " in command for command in rest) else []
+            yield pytest.param(page, rest, id=str(page.relative_to(ROOT)).replace("/", "_"), marks=drawn)
 
 
 @pytest.mark.parametrize(("page", "typed"), list(cases(slow=False)))
@@ -175,8 +177,11 @@ def run_all(surgsim, folder, page, typed):
             added = f"{SHORTER.get(command, '')} {again(command) if columns == 120 else ''}"
             variables, (program, *words) = with_variables(shlex.split(f"{command} {added}"))
             assert program == "surgsim", f"list {command} in NOT_HERE with a reason, or run it here"
-            poor = {} if command == TWO else {"MUJOCO_GL": "disable"}
-            done = surgsim(*words, columns=columns, cold=cold, env=poor | variables).wait(timeout_s=600.0)
+            draws = "--video" in words
+            poor = {} if command == TWO or draws else {"MUJOCO_GL": "disable"}
+            done = surgsim(*words, columns=columns, cold=cold or draws, env=poor | variables).wait(
+                timeout_s=600.0
+            )
             print(f"$ {command} {added}\n{done.text}")
             assert done.status == STATUS.get(command, 0), command
             assert "Traceback" not in done.text
@@ -197,6 +202,8 @@ def again(command):
     """What is added to a command that is typed a second time in its folder."""
     if command == TWO:
         return "--out runs/two_wide"
+    if command.startswith("surgsim export "):
+        return "--force"
     return "--resume" if command.startswith(("surgsim compare ", "surgsim tune ")) else ""
 
 

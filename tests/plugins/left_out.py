@@ -52,6 +52,9 @@ def _draws() -> bool:
 PARTS = {
     "chromium": Part("browser", lambda: any(map(shutil.which, BROWSERS)), "no Chromium on the PATH"),
     "ray": Part("Ray", lambda: importlib.util.find_spec("ray") is not None, "pip install 'surgsim[ray]'"),
+    "video": Part(
+        "video", lambda: importlib.util.find_spec("av") is not None, "pip install 'surgsim[video]'"
+    ),
     "opengl": Part("drawing", _draws, "neither EGL nor OSMesa"),
     "display": Part("window", lambda: shutil.which("Xvfb") is not None, "no Xvfb on the PATH"),
     "compiler": Part("C", lambda: shutil.which("cc") is not None, "no C compiler on the PATH"),

@@ -1,0 +1,1 @@
+"""What is taken from runs, batches and studies into papers, talks and other tools."""
