@@ -17,6 +17,7 @@ examples:
   surgsim run circle_lwr4plus
   surgsim run circle_lwr4plus --controller vprnn --seed 3 --out runs/mine
   surgsim run circle_lwr4plus --set trocar.position_m='[0, 0.55, 0.2]'
+  surgsim run circle_lwr4plus --live
   surgsim run peg_and_ring_panda --operator keyboard
   surgsim run my_scenario.yaml --json | jq .metrics.rcm_error_max_mm
 """
@@ -32,6 +33,19 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="keyboard|gamepad|FILE.csv",
         help="operate a teleoperation yourself, in a window; or play an operator_input.csv again",
     )
+    parser.add_argument(
+        "--live",
+        nargs="?",
+        const="",
+        metavar="HOST:PORT",
+        help="show the run in the viewer while it goes on: in a window, or in a viewer at an address",
+    )
+    parser.add_argument(
+        "--pace",
+        choices=("realtime", "free"),
+        default="realtime",
+        help="with --live: as fast as the clock, or as fast as it goes; default: %(default)s",
+    )
     parser.add_argument("--no-record", action="store_true", help="write no recording.rrd")
     parser.add_argument("--json", action="store_true", help="print metrics.json instead of a table")
 
@@ -40,11 +54,15 @@ def execute(options: argparse.Namespace) -> int:
     """Run the scenario; 0 when it completed."""
     from surgsim.cli.output import print_run, show_progress
     from surgsim.cli.table import print_prose
-    from surgsim.errors import Outcome, UnreachableError
+    from surgsim.errors import Outcome, SurgsimError, UnreachableError
     from surgsim.runs.folder import run_to_folder
     from surgsim.runs.parts import check_externals
     from surgsim.scenario.load import load_scenario
 
+    if options.live is not None and options.operator is not None:
+        raise SurgsimError(
+            "--live and --operator do not go together: a person who operates sees the scene already"
+        )
     scenario = load_scenario(
         options.scenario, controller=options.controller, assignments=options.assignments, seed=options.seed
     )
@@ -54,7 +72,19 @@ def execute(options: argparse.Namespace) -> int:
     folder = options.out or _default_folder(Path("runs") / scenario.name, name, operator)
     with show_progress(f"{scenario.name} {scenario.controller.name}", operator in _LIVE) as progress:
         try:
-            if operator is None:
+            if options.live is not None:
+                from surgsim.live.showing import run_shown
+
+                realtime = options.pace == "realtime"
+                result = run_shown(
+                    scenario,
+                    folder,
+                    options.live or None,
+                    realtime=realtime,
+                    record=record,
+                    progress=progress,
+                )
+            elif operator is None:
                 result = run_to_folder(scenario, folder, record=record, progress=progress)
             else:
                 from surgsim.live.operate import operate

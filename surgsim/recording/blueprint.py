@@ -11,13 +11,13 @@ from surgsim.scenario.schema import Scenario
 from surgsim.trace.trace import Trace
 
 
-def blueprint(scenario: Scenario, trace: Trace) -> rrb.Blueprint:
-    """The layout that is stored in the file."""
+def blueprint(scenario: Scenario, trace: Trace, until_s: float | None = None) -> rrb.Blueprint:
+    """The layout that is stored in the file; of a run that goes on until `until_s` [s], by its beginning."""
     left = rrb.Vertical(scene_view(scenario, trace), inside_view(scenario, trace), row_shares=[0.55, 0.45])
     middle = rrb.Vertical(
         errors_plot(),
         rrb.Tabs(*controller_plots(trace), active_tab=0),
-        *tabs_of(added_plots(trace)),
+        *tabs_of(added_plots(trace, until_s)),
         texts_view(),
     )
     right = rrb.Vertical(*joint_plots(trace), joint_key(trace.joints), row_shares=[0.31, 0.31, 0.31, 0.07])

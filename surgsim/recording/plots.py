@@ -102,9 +102,9 @@ def _control_time_plot(trace: Trace) -> rrb.TimeSeriesView:
     return plot("Control time [s]", series_path("control_time"), axis_y=axis)
 
 
-def added_plots(trace: Trace) -> list[rrb.TimeSeriesView]:
+def added_plots(trace: Trace, until_s: float | None = None) -> list[rrb.TimeSeriesView]:
     """What task, controller and plant add: one plot for every unit, its legend to the right of the data."""
-    axis = _with_room(trace)
+    axis = _with_room(trace, until_s)
     return [
         plot(
             _TITLES.get(unit, f"[{unit}]"),
@@ -116,9 +116,9 @@ def added_plots(trace: Trace) -> list[rrb.TimeSeriesView]:
     ]
 
 
-def _with_room(trace: Trace) -> rrb.TimeAxis:
+def _with_room(trace: Trace, until_s: float | None) -> rrb.TimeAxis:
     """The run's time, and some after it for a legend."""
-    first, last = float(trace["t_s"][0]), float(trace["t_s"][-1])
+    first, last = float(trace["t_s"][0]), float(trace["t_s"][-1] if until_s is None else until_s)
     ends = (first, last + _LEGEND_ROOM * (last - first))
     start, end = (rrb.TimeRangeBoundary.absolute(seconds=t) for t in ends)
     return rrb.TimeAxis(view_range=rrb.TimeRange(start=start, end=end))

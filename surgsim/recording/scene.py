@@ -1,6 +1,7 @@
 """The 3-D scene of a recording, rebuilt from the scenario and the joint positions of the trace."""
 
 import json
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import mujoco
@@ -36,16 +37,47 @@ def rebuild(scenario: Scenario) -> Scene:
 def log_scene(stream: rr.RecordingStream, scenario: Scenario, trace: Trace) -> None:
     """Draw the theatre, the moving bodies, both paths, the tip and the RCM error."""
     scene = rebuild(scenario)
-    stream.log(SCENE, rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
+    bodies = log_shapes(stream, scene)
     rows = sampled_rows(len(trace), scenario.recording.scene_rate_hz * trace.meta.control_period_s)
-    poses = body_poses(scene, trace, rows)
+    log_poses(stream, scene, bodies, trace, rows)
+    log_paths(stream, trace.block("tip_ref"), trace.block("tip"))
+    log_points(stream, trace, rows)
+
+
+def log_shapes(stream: rr.RecordingStream, scene: Scene) -> dict[int, str]:
+    """Draw what the bodies look like; the entities of those that are drawn, by the body."""
+    stream.log(SCENE, rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
+    entities = {}
     for body, surfaces in _surfaces(scene.model).items():
-        path = f"{SCENE}/{scene.model.body(body).name}"
-        _log_pose(stream, path, trace["t_s"][rows], poses, body)
+        entities[body] = path = f"{SCENE}/{scene.model.body(body).name}"
         for name, (surface, rgba) in surfaces.items():
             stream.log(f"{path}/{name}", _mesh(surface, rgba), static=True)
-    _log_paths(stream, trace)
-    _log_points(stream, trace, rows)
+    return entities
+
+
+def log_poses(
+    stream: rr.RecordingStream,
+    scene: Scene,
+    bodies: Mapping[int, str],
+    trace: Trace,
+    rows: np.ndarray[tuple[int], np.dtype[np.intp]],
+    *,
+    goes_on: bool = False,
+) -> None:
+    """Put the drawn bodies where they were at `rows`.
+
+    Args:
+        stream: Where to.
+        scene: The scene.
+        bodies: Of `log_shapes`.
+        trace: The run, or a piece of it.
+        rows: Of the trace.
+        goes_on: Whether further pieces follow: a body that can move is then never said to stand for good.
+    """
+    poses = body_poses(scene, trace, rows)
+    for body, path in bodies.items():
+        fixed = scene.model.body_weldid[body] == 0 and scene.model.body_mocapid[body] < 0
+        _log_pose(stream, path, trace["t_s"][rows], poses, body, may_stand=fixed or not goes_on)
 
 
 def sampled_rows(count: int, samples_per_tick: float) -> np.ndarray[tuple[int], np.dtype[np.intp]]:
@@ -120,10 +152,12 @@ def _mesh(surface: Triangles, rgba: Array) -> rr.Mesh3D:
     )
 
 
-def _log_pose(stream: rr.RecordingStream, path: str, t_s: Array, poses: Poses, body: int) -> None:
+def _log_pose(
+    stream: rr.RecordingStream, path: str, t_s: Array, poses: Poses, body: int, *, may_stand: bool
+) -> None:
     """A body's pose: once if it never moves, else at every sample. rerun's quaternions are xyzw."""
     position, quaternion = poses.position[:, body], poses.quaternion[:, body][:, [1, 2, 3, 0]]
-    if np.all(position == position[0]) and np.all(quaternion == quaternion[0]):
+    if may_stand and np.all(position == position[0]) and np.all(quaternion == quaternion[0]):
         pose = rr.Transform3D(translation=position[0], quaternion=rr.Quaternion(xyzw=quaternion[0]))
         stream.log(path, pose, static=True)
         return
@@ -133,14 +167,14 @@ def _log_pose(stream: rr.RecordingStream, path: str, t_s: Array, poses: Poses, b
     stream.send_columns(path, [rr.TimeColumn(TIMELINE, duration=timestamps(t_s))], columns)
 
 
-def _log_paths(stream: rr.RecordingStream, trace: Trace) -> None:
-    """Both paths; the desired one in dashes, so that the actual one on it is seen between them."""
-    rows = np.unique(np.linspace(0, len(trace) - 1, _POINTS_PER_LINE).astype(np.intp))
-    for name, block, color, width in (
-        (DESIRED_PATH, "tip_ref", palette.SKY, 1.8),
-        (ACTUAL_PATH, "tip", palette.BLACK, 0.8),
+def log_paths(stream: rr.RecordingStream, desired: Array, actual: Array) -> None:
+    """Both paths (rows, 3); the desired one in dashes, so that the actual one on it is seen between them."""
+    rows = np.unique(np.linspace(0, len(actual) - 1, _POINTS_PER_LINE).astype(np.intp))
+    for name, points, color, width in (
+        (DESIRED_PATH, desired, palette.SKY, 1.8),
+        (ACTUAL_PATH, actual, palette.BLACK, 0.8),
     ):
-        line = trace.block(block)[rows]
+        line = points[rows]
         line = line[np.isfinite(line).all(axis=1)]
         strips = dashes(line) if name == DESIRED_PATH else [line]
         shown = rr.LineStrips3D(
@@ -161,7 +195,7 @@ def dashes(line: Array) -> list[Array]:
     return [line[a:b] for a, b in zip(starts, ends, strict=True) if piece[a] % 2 == 0]
 
 
-def _log_points(
+def log_points(
     stream: rr.RecordingStream, trace: Trace, rows: np.ndarray[tuple[int], np.dtype[np.intp]]
 ) -> None:
     """The tip, and the RCM error as an arrow from the trocar to the shaft, enlarged."""

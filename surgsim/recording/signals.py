@@ -24,7 +24,10 @@ _SCALAR_COLORS = {
 
 
 def log_signals(stream: rr.RecordingStream, trace: Trace) -> None:
-    """Send every block but the time, then what is derived for the plots."""
+    """Send every block but the time, then what is derived for the plots.
+
+    A piece of a run may be sent after the other.
+    """
     times = timestamps(trace["t_s"])
     colors = series_colors(trace)
     for block in trace.blocks[1:]:

@@ -14,6 +14,7 @@ from surgsim.recording.scene import log_scene, scenario_of
 from surgsim.recording.signals import log_signals
 from surgsim.recording.stream import stream_to
 from surgsim.recording.summary import outcome_sentence, result_markdown, scenario_markdown
+from surgsim.scenario.schema import Scenario
 from surgsim.trace.trace import Trace, TraceMeta
 
 
@@ -35,11 +36,16 @@ def write_recording(path: Path, trace: Trace, metrics: Mapping[str, float | None
     packed = encode(trace.data)
     sha256 = seal(packed, texts)
     with stream_to(path, blueprint(scenario, trace), recording_id=sha256[:32]) as stream:
-        stream.send_recording_name(f"{scenario.name} · {scenario.controller.name} · seed {scenario.seed}")
+        stream.send_recording_name(recording_name(scenario))
         log_header(stream, texts, packed, sha256)
         log_signals(stream, trace)
         log_scene(stream, scenario, trace)
         log_texts(stream, trace.meta, metrics)
+
+
+def recording_name(scenario: Scenario) -> str:
+    """What the viewer calls a run."""
+    return f"{scenario.name} · {scenario.controller.name} · seed {scenario.seed}"
 
 
 def log_header(stream: rr.RecordingStream, texts: Mapping[str, str], packed: bytes, sha256: str) -> None:

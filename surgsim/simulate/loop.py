@@ -144,6 +144,11 @@ class Simulation:
         return float(self._setup.plant.world.t_s)
 
     @property
+    def rows(self) -> int:
+        """Rows of the trace so far."""
+        return int(self._run.progress.rows)
+
+    @property
     def ended(self) -> bool:
         """Whether the run has ended."""
         return self._ending is not None
@@ -349,8 +354,8 @@ class Simulation:
             "arm's model": setup.arm.scene.model,
         }
 
-    def trace(self) -> Trace:
-        """The trace so far, with its derived columns."""
+    def trace(self, first: int = 0) -> Trace:
+        """The trace so far, or its rows from `first` on, with the derived columns."""
         ending = self._ending or Ending(outcome=Outcome.COMPLETED, t_s=self.time_s)
         drive = self._setup.arm.drive
         limits = self._setup.scene.limits.published()
@@ -362,4 +367,4 @@ class Simulation:
             limits=limits,
             ending=ending,
         )
-        return self._rows.finish(int(self._run.progress.rows), meta)
+        return self._rows.finish(int(self._run.progress.rows), meta, first)

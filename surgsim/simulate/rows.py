@@ -54,9 +54,9 @@ class Rows:
         places = {**self.at, **self.group}
         return np.array([places[name].start for name in names], dtype=np.int64)
 
-    def finish(self, count: int, meta: TraceMeta) -> Trace:
-        """The first `count` rows with the derived columns, as a trace."""
-        data = self.data[:count].copy()
+    def finish(self, count: int, meta: TraceMeta, first: int = 0) -> Trace:
+        """The rows from `first` on and before `count`, with the derived columns, as a trace."""
+        data = self.data[first:count].copy()
         self._derive(self._model, data, self._derived)
         data.flags.writeable = False
         return Trace(data, self._blocks, meta)

@@ -32,7 +32,7 @@ NEXT = {
     "tune rcm_i": ["rcm_interaction_force", "rcm_inverse_dynamics"],
     "tune pinv --scenario theatre_p": ["theatre_panda"],
     "list to": ["torque-laws"],
-    "ex": ["export"],
+    "ex": ["export", "external"],
     "export runs/one --action t": ["tip_velocity", "torque"],
     "export runs/one --width ": ["column", "page"],
     "reproduce vp": ["vprnn"],
