@@ -7,6 +7,7 @@ import subprocess
 import sys
 
 import pytest
+from shipped_controllers import FEELS
 
 from surgsim.cli.list import KINDS
 from surgsim.cli.main import COMMANDS, main
@@ -51,7 +52,7 @@ def _set(*assignments):
 def test_every_shipped_scenario_runs(surgsim, name, tmp_path):
     path = isinstance(load_scenario(name).task, PathTaskConfig)
     short = SHORT if path else SHORT[:1]
-    if "human_push" in name:  # which begins after the end of a run cut short
+    if "human_push" in name or "guidance" in name:  # which begins after the end of a run cut short
         short = (*short, "disturbances=[]")
     if load_scenario(name).robot.drives is not None:  # no elastic gear follows such a circle in 0.3 s
         short = (*short, "task.radius_m=0.002")
@@ -279,7 +280,7 @@ def test_version(capsys):
 def test_every_shipped_controller_runs_the_circle(capsys, monkeypatch, tmp_path, name):
     monkeypatch.chdir(tmp_path)
     words = ["run", "circle_lwr4plus", "--controller", name, "--no-record", "--json"]
-    wall = ["trocar.wall={}"] if name == "rcm_interaction_force" else []  # it feels for one
+    wall = ["trocar.wall={}"] if name in FEELS else []
     assert main([*words, *_set(*SHORT, *SLOW_LIMITS, *wall, "theatre=false", "task.radius_m=0.002")]) == 0
     summary = json.loads(capsys.readouterr().out)
     assert (summary["controller"], summary["outcome"]["name"]) == (name, "completed")

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from shipped_controllers import FEELS
 
 from surgsim.control.rcm import rcm_kinematics
 from surgsim.control.resolvers import RESOLVERS
@@ -35,7 +36,7 @@ def made(joints, controller, *assignments):
 @arms
 @pytest.mark.parametrize("controller", sorted(shipped("controllers")))
 def test_every_shipped_controller_completes_or_is_refused(joints, controller):
-    wall = ["trocar.wall={}"] if controller == "rcm_interaction_force" else []
+    wall = ["trocar.wall={}"] if controller in FEELS else []
     scenario = made(joints, controller, *wall)
     if (joints, controller) == (6, "self_motion"):
         with pytest.raises(
