@@ -34,6 +34,9 @@ CONTROLLERS = (
     "hierarchical_qp",
     "rcm_inverse_dynamics",
     "self_motion",
+    "constraint_consistent",
+    "rcm_elastic_dynamics",
+    "rcm_mpc",
 )
 PUSH = "disturbances=[{type: push}]"
 CONDITIONS = {
@@ -65,7 +68,8 @@ def run(controller: str, assignments: Sequence[str]) -> tuple[str, dict[str, Any
     """Outcome, metrics and error columns of the circle with `controller`."""
     trace = simulate(load_scenario(SCENARIO, controller=controller, assignments=assignments))
     columns = {name: trace[name].ravel().copy() for name in ("t_s", "tip_error_m", "rcm_error_m")}
-    return trace.meta.ending.outcome.name.lower(), dict(compute_metrics(trace)), columns
+    ending = trace.meta.ending
+    return ending.outcome.name.lower(), {**compute_metrics(trace), "end_s": ending.t_s}, columns
 
 
 def many(jobs: Sequence[tuple[str, Sequence[str]]]) -> list[tuple[str, dict, dict]]:
@@ -104,9 +108,9 @@ def print_table(measured: dict[str, dict[str, tuple[str, dict, dict]]]) -> None:
     print("| controller | condition | outcome | tip RMS | tip max | RCM RMS | RCM max |")
     print("|---|---|---|---|---|---|---|")
     for name, results in measured.items():
-        for condition, (outcome, metrics, columns) in results.items():
+        for condition, (outcome, metrics, _) in results.items():
             values = " | ".join(_number(metrics[key]) for key in COLUMNS)
-            end = outcome if outcome == "completed" else f"{outcome} at {columns['t_s'][-1]:.2f} s"
+            end = outcome if outcome == "completed" else f"{outcome} at {metrics['end_s']:.2f} s"
             print(f"| [{name}]({name}.md) | {condition} | {end} | {values} |")
 
 
