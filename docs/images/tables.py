@@ -22,6 +22,7 @@ PAGES = (
     "README.md",
     "docs/robustness.md",
     "docs/drives.md",
+    "docs/baselines.md",
     "docs/peg_and_ring.md",
     "results/leaderboard/README.md",
 )
@@ -206,6 +207,42 @@ def _cells(rows: Rows, name: str, at: Sequence[float]) -> list[str]:
     return ["; ".join(said)]
 
 
+def _baselines() -> str:
+    """A row for each controller over all arms: fewest failures first, then the smallest 95th percentile."""
+    columns = [
+        Column(heading="RCM RMS, median", metric="rcm_error_rms_mm", of=np.median),
+        Column(heading="95 %", metric="rcm_error_rms_mm", of=_most),
+        Column(heading="worst", metric="rcm_error_rms_mm", of=np.max),
+        Column(heading="tip RMS, median", metric="tip_error_rms_mm", of=np.median),
+        Column(heading="95 %", metric="tip_error_rms_mm", of=_most),
+        Column(heading="torque, mean [N m]", metric="torque_total_mean_nm"),
+        Column(heading="ticks at the rate, 95 %", metric="torque_rate_over_fraction", of=_most),
+    ]
+    rows = [row for row in rows_of("baselines") if row["outcome"] != "refused"]
+    names = dict.fromkeys(row["controller"] for row in rows)
+    mine = {name: [row for row in rows if row["controller"] == name] for name in names}
+    done = {name: [row for row in of if row["outcome"] == "completed"] for name, of in mine.items()}
+
+    def order(name: str) -> tuple[int, float]:
+        errors = [row["rcm_error_rms_mm"] for row in done[name]]
+        return len(mine[name]) - len(done[name]), _most(errors) if errors else np.inf
+
+    def cell(column: Column, of: Rows) -> str:
+        values = [row[column.metric] for row in of if row[column.metric] is not None]
+        return f"{float(column.of(values)):.3g}" if values else "–"
+
+    lines = [
+        [f"`{name}`", f"{len(done[name])} of {len(mine[name])}", *(cell(c, done[name]) for c in columns)]
+        for name in sorted(names, key=order)
+    ]
+    return table(["controller", "completed", *(column.heading for column in columns)], lines)
+
+
+def _most(values: Sequence[float]) -> float:
+    """The 95th percentile."""
+    return float(np.quantile(values, 0.95))
+
+
 def _breathing(kind: str, metrics: tuple[tuple[str, str], tuple[str, str]]) -> str:
     columns = {
         f"breathing_{kind}_{arm}": [
@@ -232,6 +269,7 @@ FORCE = (("force RMS [N]", "trocar_force_rms_n"), ("max [N]", "trocar_force_max_
 TABLES: dict[str, Callable[[], str]] = {
     "nominal": _nominal,
     "theatre_short": _theatre_short,
+    "baselines": _baselines,
     "drives_arms": _drives_arms,
     "drives_levels": _drives_levels,
     "theatre_ideal_lwr4plus": lambda: _theatre("lwr4plus"),

@@ -15,7 +15,7 @@ shaft. D, not its root: the distance has no gradient where the shaft passes thro
 
 Source: the first-order form is that of Marinho et al., IEEE T-RO 35:1166 (2019) and ICRA 2019; the
 second-order form that of exponential control barrier functions, Nguyen and Sreenath, ACC 2016, with real
-poles, and of the inequalities for torque-actuated robots of Quiroz-Omana and Adorno, IEEE RA-L 4:4279 (2019).
+poles, and of the inequalities for torque-actuated robots of Quiroz-Omana and Adorno, IEEE RA-L 4:4048 (2019).
 """
 
 import numpy as np

@@ -1,5 +1,6 @@
 """A recorded run as an episode of steps: what a policy saw, did and got, at the policy's rate."""
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal, get_args
@@ -111,6 +112,8 @@ def _asked_every(scenario: Mapping[str, Any]) -> int:
 def _ticks_of_a_step(trace: Trace, rate_hz: float | None, default: int) -> tuple[int, int]:
     """Ticks of a step, and steps a second."""
     tick_hz = 1.0 / trace.meta.control_period_s
+    if rate_hz is not None and not 0.0 < rate_hz < math.inf:
+        raise SurgsimError(f"--rate: {rate_hz:g} is not allowed: a rate above 0 Hz")
     ticks = default if rate_hz is None else tick_hz / rate_hz
     rate = tick_hz / ticks
     if (

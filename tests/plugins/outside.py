@@ -3,7 +3,7 @@
 As velocities it gives what the resolver `pinv` gives, in the same order of operations, so to the same bit; as
 torques it makes the joints follow their reference. The first argument is how it fails, the second at which
 request of a run, counted from 1, the third a seed, the fourth its version. `gives_up` is no failure of the
-process: it says once that there is no command.
+process: it says once that there is no command. One that is `deaf` goes on answering, and reads no more.
 """
 
 import json
@@ -112,6 +112,10 @@ def serve(fails, at, seed, release):
             fail(fails, seen, messages["reply"], seed)
         found = None if fails == "gives_up" and seen["tick"] == at else answer(seen)
         os.write(1, packed(messages["reply"], seen["tick"], found))
+        while fails == "deaf" and seen["tick"] >= at:  # it answers what it does not read
+            seen["tick"] += 1
+            time.sleep(0.005)  # two answers at once would be seen as too long a one
+            os.write(1, packed(messages["reply"], seen["tick"], found))
 
 
 def unpacked(content, fields):

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from surgsim.errors import SurgsimError
 
-_FUNCTION = re.compile(r"(?P<file>.+\.(?:so(?:\.\d+)*|dylib|dll)):(?P<name>[A-Za-z_]\w*)")
+_FUNCTION = re.compile(r"(?P<file>(?:[^\s]|\\ )+\.(?:so(?:\.\d+)*|dylib|dll)):(?P<name>[A-Za-z_]\w*)")
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -2,7 +2,7 @@
 
 The request is filled from what a part sees, word by word, and given to the controller: a function by its
 address, a process through a pipe. A process that does not answer, or answers what is no answer, leaves a
-reason in the `Post`, whose words are in `surgsim.control.external.reasons`.
+reason in the `Post`'s report, whose words are in `surgsim.control.external.outside`.
 """
 
 import math
@@ -21,11 +21,14 @@ from surgsim.tick.views import vector, words
 
 Array = NDArray[np.float64]
 
-FINE, SILENT, CLOSED, TOO_LONG, FOREIGN, LATE, STATUS, NOT_FINITE, INTERRUPTED = range(9)
-"""Why there is no answer, `Report.reason`."""
+FINE, SILENT, CLOSED, TOO_LONG, FOREIGN, LATE, STATUS, NOT_FINITE, INTERRUPTED, UNREAD = range(10)
+"""Why there is no answer: the first word of a report."""
 TICK, FIRST = 1, 3
 """Words of a request."""
 _HEAD, _READY = 3, 1
+_TO_WRITE = 3
+_BROKEN = 8 | 16 | 32
+"""POLLERR, POLLHUP and POLLNVAL: nobody reads there."""
 AFTER_SIGNAL_S = 0.1
 """How long an answer may still take after a signal: Ctrl-C is Python's, which is not entered before [s]."""
 
@@ -44,8 +47,9 @@ class Post(Record):
         runs: How many there are.
         q_word: Where `Seen.q` is in what is seen, in words.
         files: Address of the numbers of a process's files: the `pollfd` of the one that it writes to, the one
-            that it reads from, the one that it writes to. They are -1 once it is ended.
-        report: Address of a `Report`: reason, and a word that says more.
+            that it reads from, the one that it writes to, and the `pollfd` of the one that it reads from. They
+            are -1 once it is ended.
+        report: Address of two words: the reason, and one that says more.
     """
 
     ADDRESSES: ClassVar[frozenset[str]] = frozenset(
@@ -119,10 +123,13 @@ def _fill(post: Post, seen: Seen, tick: int) -> None:
 def _ask(post: Post, report: NDArray[np.int64]) -> int:
     """Send the request, wait for the reply; FINE, or why there is none."""
     report[1] = 0
-    files = words(post.files, 3)
-    if sys_write(files[1], post.request, post.request_bytes) != post.request_bytes:
-        return CLOSED
-    until, wait_s, got, silent = monotonic() + post.timeout_s, post.timeout_s, 0, SILENT
+    files, until = words(post.files, _TO_WRITE + 1), monotonic() + post.timeout_s
+    sent = sys_write(files[1], post.request, post.request_bytes)
+    if sent != post.request_bytes:  # what it has not read yet fills the pipe, or it has ended
+        why = _send_rest(post, files, max(sent, 0), until)
+        if why != FINE:
+            return why
+    wait_s, got, silent = post.timeout_s, 0, SILENT
     while got < post.reply_bytes:
         ready = sys_poll(post.files, 1, math.ceil(1e3 * wait_s))
         if ready == _READY:
@@ -143,3 +150,25 @@ def _ask(post: Post, report: NDArray[np.int64]) -> int:
     if got > post.reply_bytes:
         return TOO_LONG
     return FINE if head[1] == words(post.request, TICK + 1)[TICK] else LATE
+
+
+@compiled
+def _send_rest(post: Post, files: NDArray[np.int64], sent: int, until: float) -> int:
+    """Send what is left of a request as soon as it is read; FINE, or why it is not."""
+    why, refused = UNREAD, False
+    while sent < post.request_bytes:
+        wait_s = until - monotonic()
+        if wait_s <= 0.0:
+            return why
+        ready = sys_poll(post.files + 8 * _TO_WRITE, 1, math.ceil(1e3 * wait_s))
+        if ready < 0:
+            if why == UNREAD:
+                until, why = min(until, monotonic() + AFTER_SIGNAL_S), INTERRUPTED
+            continue
+        if ready == _READY:
+            if refused or (files[_TO_WRITE] >> 48) & _BROKEN:
+                return CLOSED
+            count = sys_write(files[1], post.request + sent, post.request_bytes - sent)
+            refused = count <= 0
+            sent += max(count, 0)
+    return FINE

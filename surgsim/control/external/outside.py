@@ -19,7 +19,7 @@ from surgsim.tick.arrays import Seen, layout
 from surgsim.tick.overlay import laid_over
 
 Array = NDArray[np.float64]
-_POLLIN, _SHOWN = 1, 16
+_POLLIN, _POLLOUT, _SHOWN = 1, 4, 16
 
 
 class Outside:
@@ -52,7 +52,7 @@ class Outside:
         self._library: Library | None = None
         self._request, self._reply = np.zeros(1, request().dtype), np.zeros(reply().dtype.itemsize // 8 + 1)
         self._plan = np.array(runs(n), dtype=np.int64).ravel()
-        self._files, self._report = np.full(3, -1), np.zeros(2, dtype=np.int64)
+        self._files, self._report = np.full(4, -1), np.zeros(2, dtype=np.int64)
         self._request["magic"], self._request["n"] = REQUEST, n
         self.gains = np.zeros(POST_SIZE)
         self._post: Any = laid_over(Post, self.gains)
@@ -65,7 +65,7 @@ class Outside:
             self._process = Process(self._who, command.words)
             self.declared = self._process.greet(head + told, start_timeout_s)
             ask, answer = self._process.files
-            self._files[:] = answer | _POLLIN << 32, ask, answer
+            self._files[:] = answer | _POLLIN << 32, ask, answer, ask | _POLLOUT << 32
         remember(text, self.declared)
 
     def _fill_post(self, n: int, timeout_s: float) -> None:
@@ -105,6 +105,8 @@ class Outside:
         match why:
             case exchange.SILENT:
                 return f"did not answer within {float(self._post.timeout_s):g} s {at}{self._what_came(more)}"
+            case exchange.UNREAD:
+                return f"did not read what it was asked within {float(self._post.timeout_s):g} s {at}"
             case exchange.INTERRUPTED:
                 return f"did not answer within {exchange.AFTER_SIGNAL_S:g} s of a signal {at}"
             case exchange.TOO_LONG:

@@ -99,8 +99,7 @@ class Process:
                     text = f"{self._who} {self.ended()} before it declared itself"
                     raise SurgsimError(f"{text}{self.last_words}")
                 got += more
-        os.set_blocking(ask, True)
-        return got
+        return got  # requests are not waited for either: one that does not read must not stop the run
 
     def ended(self) -> str:
         """How it ended; it is given a moment for that. It is killed if it is still there."""

@@ -134,6 +134,18 @@ WORDS = {
 }
 
 
+def test_a_process_that_answers_and_does_not_read_is_not_waited_for(scenario):
+    """Requests fill the pipe to it after a while; a write that waits would never end."""
+    began = time.monotonic()
+    with giving({"mine": outside.command("deaf", 50)}):
+        trace = simulate(scenario(SOON, "safety.stop={duration_s: 0.02}"))
+    assert time.monotonic() - began < 30.0
+    ending = trace.meta.ending
+    assert ending.outcome is Outcome.EXTERNAL_FAILED
+    assert "external controller 'mine' did not read what it was asked within 0.2 s" in ending.detail
+    assert ending.t_s > 0.05
+
+
 @pytest.mark.parametrize("how", outside.FAILURES)
 def test_a_process_that_fails_is_an_outcome_with_its_words(scenario, how):
     with giving({"mine": outside.command(how, 50, 1)}):
