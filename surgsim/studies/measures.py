@@ -1,20 +1,33 @@
-"""Measures of a trace that a study may take, and random starts whose convergence is measured."""
+"""Measures of a trace that a study may take."""
 
 import math
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from surgsim.control.rcm import rcm_kinematics
-from surgsim.simulate.setup import Setup
+from surgsim.metrics.accuracy import rms
 from surgsim.studies.study import Array
+from surgsim.studies.tables import Row
 from surgsim.trace.trace import Trace
 
 
 def outcome(trace: Trace) -> str:
     """How the run ended."""
     return trace.meta.ending.outcome.name.lower()
+
+
+def tracking(trace: Trace) -> Row:
+    """Outcome, its time [s], RMS and largest tip and RCM error [mm], mean of mu [m^3]; until a stop."""
+    active = trace.active()
+    errors = {name: 1e3 * active[f"{name}_error_m"] for name in ("tip", "rcm")}
+    return {
+        "outcome": outcome(trace),
+        "end_s": trace.meta.ending.t_s,
+        **{f"{name}_rms_mm": rms(error) for name, error in errors.items()},
+        **{f"{name}_max_mm": float(error.max()) for name, error in errors.items()},
+        "mu_mean": float(np.mean(active["manipulability"])),
+    }
 
 
 def within_from_s(t: Array, error: NDArray[np.floating[Any]], threshold: float) -> float | None:
@@ -30,32 +43,3 @@ def decay_rate(t: Array, error: Array, share: float) -> float | None:
     """Rate [1/s] of the exponential that reaches `share` of its start when `error` does; None if never."""
     time = within_from_s(t, error, share * float(error[0]))
     return math.log(1.0 / share) / time if time else None
-
-
-class Spread(NamedTuple):
-    """How far random starts are off.
-
-    The standard deviation of the joints' displacement [rad], and smallest and largest distance [mm] of the
-    tip from the path's start and of the shaft from the trocar.
-    """
-
-    deviation_rad: float
-    tip_mm: tuple[float, float]
-    rcm_mm: tuple[float, float]
-
-    def draw(self, setup: Setup, seed: int) -> Array:
-        """Joint positions (n,) [rad] inside the limits whose tip and shaft are displaced that far."""
-        rng, limits = np.random.default_rng(seed), setup.arm.limits
-        here, p_WC = setup.arm.kinematics(setup.q_start).p_WT, setup.plant.reset(setup.q_start).p_WC
-        while True:
-            q = setup.q_start + self.deviation_rad * rng.standard_normal(setup.q_start.size)
-            kin = setup.arm.kinematics(q)
-            tip = 1e3 * float(np.linalg.norm(kin.p_WT - here))
-            rcm = 1e3 * float(np.linalg.norm(rcm_kinematics(kin, p_WC, np.zeros(3)).error))
-            inside = bool((q > limits.q_min).all() and (q < limits.q_max).all())
-            if inside and _between(tip, self.tip_mm) and _between(rcm, self.rcm_mm):
-                return q
-
-
-def _between(value: float, bounds: tuple[float, float]) -> bool:
-    return bounds[0] <= value <= bounds[1]

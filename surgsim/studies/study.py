@@ -18,7 +18,8 @@ Curves = Mapping[str, Array]
 Progress = Callable[[str], None]
 """Called with a line about what is being done."""
 
-Verdict = Literal["holds", "does not hold", "depends", "not comparable"]
+Verdict = Literal["holds", "can be fitted", "does not hold", "depends", "not comparable"]
+"""`can be fitted`: our figures are the paper's, with constants that were fitted to these very figures."""
 Judged = tuple[Verdict, str]
 """A verdict and the figures behind it."""
 
@@ -28,9 +29,9 @@ def holds(condition: bool) -> Verdict:
     return "holds" if condition else "does not hold"
 
 
-def in_all(flags: Sequence[bool]) -> Verdict:
-    """The verdict of a claim that is so in all, some or none of several cases."""
-    return "holds" if all(flags) else "depends" if any(flags) else "does not hold"
+def in_all(flags: Sequence[bool], every: Verdict = "holds") -> Verdict:
+    """The verdict of a claim that is so in all (`every`), some or none of several cases."""
+    return every if all(flags) else "depends" if any(flags) else "does not hold"
 
 
 @dataclass(frozen=True)

@@ -3,8 +3,9 @@
 import csv
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
+_T = TypeVar("_T")
 Cell = str | int | float | None
 Row = Mapping[str, Cell]
 Tables = Mapping[str, Sequence[Row]]
@@ -38,6 +39,11 @@ def groups(rows: Iterable[Row], *columns: str) -> dict[tuple[Cell, ...], list[Ro
     for row in rows:
         found.setdefault(tuple(row[column] for column in columns), []).append(row)
     return found
+
+
+def pairs(rows: Sequence[_T]) -> list[tuple[_T, _T]]:
+    """First and second, third and fourth, and so on: two methods in turn."""
+    return list(zip(rows[::2], rows[1::2], strict=True))
 
 
 def span(values: Sequence[float], digits: int = 3) -> str:

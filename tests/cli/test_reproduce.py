@@ -62,7 +62,7 @@ def test_quick_through_the_installed_command(tmp_path):
     command = [sys.executable, "-W", "error", "-m", "surgsim", "reproduce", NAME, "--quick"]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=200)
     assert done.returncode == 0, done.stderr
-    assert done.stderr.startswith("1 of 8: circle, home 3: pinv, paper timing\n")
+    assert done.stderr.startswith("1 of 11: circle, home 3: pinv, paper timing\n")
     assert done.stderr.endswith(f"wrote results/{NAME}_quick\n")
     lines = [line.split() for line in done.stdout.splitlines()]
     assert ["circle", "3", "0.02460", "0.02460", "-0.01", "0.02641", "0.02640", "0.03"] in lines

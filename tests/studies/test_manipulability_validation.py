@@ -11,8 +11,10 @@ from surgsim.models.config import RobotConfig, SceneConfig
 from surgsim.studies import manipulability_validation as study
 from surgsim.studies.engine import run_study
 from surgsim.studies.manipulability_validation import STUDY, calibrate, cases, within_limits
-from surgsim.studies.manipulability_validation.calibrate import HOMES_RAD, STEPS
-from surgsim.studies.manipulability_validation.cases import HOMES, PAPER, PATHS, PERIOD_S, Cell
+from surgsim.studies.manipulability_validation.calibrate import HOMES, HOMES_RAD, PAPER, PATHS, STEPS
+from surgsim.studies.manipulability_validation.cases import PERIOD_S, Cell, UnfittedHome, stepped
+from surgsim.studies.samples import by, judge_ratios, judge_together, sample_row
+from surgsim.studies.stepped import acceleration_ratio, tip_errors
 
 RESULTS = Path(__file__).resolve().parents[2] / "results" / "manipulability_validation"
 CELLS = [(path, home) for path in PATHS for home in HOMES]
@@ -20,7 +22,7 @@ CELLS = [(path, home) for path in PATHS for home in HOMES]
 
 @pytest.fixture(scope="module")
 def committed(read_numbers):
-    names = ("table_4", "table_4_increase", "table_5", "attainable", "variants", "printed_network", "homes")
+    names = tuple(sorted(path.stem for path in RESULTS.glob("*.csv")))
     return {name: read_numbers(RESULTS / f"{name}.csv") for name in names}
 
 
@@ -132,7 +134,7 @@ def test_the_calibration_s_kinematics_are_the_arm_s():
 
 def test_refinement_finds_a_home_again():
     home = 3
-    target = cases.table_4_averages(home)
+    target = calibrate.table_4_averages(home)
     start = np.array([HOMES_RAD[home][:6]]) + 0.02
     (q,) = calibrate.refine(start, target, 60, 6)
     before, after = (np.abs(calibrate.averages(x, 60)[0] / target - 1.0).max() for x in (start, q[None]))
@@ -152,10 +154,62 @@ def test_the_velocity_of_a_step_leads_from_sample_to_sample(path):
     assert np.abs(steps[-1]).max() == 0.0
 
 
+def test_a_random_home_made_again_gives_the_committed_row_and_the_independent_model_s(committed, remade):
+    for row in remade["random_homes_every"]:
+        assert_same(row, committed["random_homes_every"][int(row["home"])], 1e-5)
+    followed = [row for row in remade["random_homes_every"] if row["followed"] == "yes"]
+    assert 0 < len(followed) < len(remade["random_homes_every"])
+    q = np.array([UnfittedHome(int(row["home"])).draw() for row in followed])
+    found, _ = calibrate.averages(q, STEPS)
+    for row, averages in zip(followed, found, strict=True):
+        percent = 100.0 * (averages[3:] / averages[:3] - 1.0)
+        assert [row[f"{path}_percent"] for path in PATHS] == pytest.approx(percent, rel=0.05)
+
+
+def test_the_random_homes_are_two_hundred_and_are_counted(committed):
+    every = [row for row in committed["random_homes_every"] if row["followed"] == "yes"][:200]
+    for row in committed["random_homes"]:
+        wanted = [row["path"]] if row["path"] in PATHS else PATHS
+        found = [min(one[f"{path}_percent"] for path in wanted) for one in every]
+        assert (row["n"], row["drawn"]) == (200, 1 + every[-1]["home"])
+        assert row["increases"] == sum(x > 0.0 for x in found)
+        assert row["median_percent"] == pytest.approx(np.median(found), rel=1e-6)
+    assert not set(HOMES_RAD.values()) & {UnfittedHome(k).draw() for k in range(10)}
+
+
+def test_a_sample_s_intervals_cover_as_often_as_they_say():
+    """Medians of the standard normal distribution, whose median is 0."""
+    rng, covered = np.random.default_rng(730127), 0
+    for _ in range(400):
+        row = sample_row(rng.standard_normal(60))
+        covered += row["median_low_percent"] <= 0.0 <= row["median_high_percent"]
+    assert 0.93 <= covered / 400 <= 0.99
+    assert sample_row([1.0, 2.0, 3.0])["share_low_percent"] is None
+
+
+def test_in_the_same_time_the_increase_does_not_depend_on_the_number_of_steps(committed):
+    medians = by(committed["steps"], "kept", "median_percent")
+    assert max(medians["time of the path"]) < 1.02 * min(medians["time of the path"])
+    assert medians["time of a step"][-1] > 5.0 * medians["time of a step"][0]
+    case = stepped("circle", 4, "rnn", 500, same_time=True)
+    assert (case.period_s, case.duration_s) == (0.02, 10.0)
+    assert stepped("circle", 4, "rnn", 500, same_time=False).period_s == PERIOD_S
+    assert stepped("circle", 4, "rnn", 1000, same_time=True) == Cell("circle", 4, "rnn")
+
+
+def test_ratios_and_ranks_are_judged():
+    assert judge_ratios({"a": [1.0, 1.2], "b": [2.0, 2.1]}, 1.1, "%")[0] == "depends"
+    assert judge_ratios({"a": [1.0]}, 1.1, "%") is None
+    up, down = list(range(5)), list(range(5, 0, -1))
+    assert judge_together({"one": (up, up)})[0] == "holds"
+    assert judge_together({"one": (up, down), "two": (up, up)})[0] == "depends"
+    assert judge_together({"one": (up[:4], up[:4])}) is None
+
+
 def test_errors_with_matched_and_lagged_indices(trace_of):
     tip = np.column_stack([np.arange(5.0), np.zeros(5), np.zeros(5)])
     trace = trace_of(5, tip=tip, tip_ref=tip + np.array([0.0, 2.0, 0.0]))
-    matched, lagged = cases.tip_errors(trace)
+    matched, lagged = tip_errors(trace)
     np.testing.assert_allclose(matched, 2.0)
     np.testing.assert_allclose(lagged, np.hypot(1.0, 2.0))
     assert rms(matched) == pytest.approx(2.0)
@@ -166,21 +220,23 @@ def test_the_acceleration_from_rest_counts(trace_of):
     v[1:, 2] = 0.008
     trace = trace_of(3, v=v)
     limit = trace.meta.limits["acceleration"][2]
-    assert cases.acceleration_ratio(trace) == pytest.approx(8.0 / limit)
+    assert acceleration_ratio(trace) == pytest.approx(8.0 / limit)
 
 
 def test_a_worse_result_changes_the_verdicts(committed):
     verdicts = {claim.text: claim.verdict for claim in STUDY.judge(committed)}
-    assert sum(verdict == "holds" for verdict in verdicts.values()) == 7
+    assert sum(verdict == "holds" for verdict in verdicts.values()) == 6
+    assert sum(verdict == "can be fitted" for verdict in verdicts.values()) == 3
     spoilt = {name: [dict(row) for row in rows] for name, rows in committed.items()}
     spoilt["table_4"][0]["pinv_off_percent"] = 1.2
     spoilt["table_4_increase"][5]["increase"] = -1e-5
+    spoilt["random_homes"][1]["share_percent"] = 98.5
     spoilt["attainable"][7]["fraction_self_motion"] = 0.89
     spoilt["attainable"][2]["acceleration_over_limit"] = 1.01
     for row in spoilt["attainable"]:
         row["tip_rms_m"] = 2e-5
     changed = [claim for claim in STUDY.judge(spoilt) if claim.verdict != verdicts[claim.text]]
-    assert sorted(claim.verdict for claim in changed) == [*4 * ["depends"], "does not hold"]
+    assert sorted(claim.verdict for claim in changed) == [*5 * ["depends"], "does not hold"]
     assert "11 of 12 cells" in changed[0].evidence
 
 

@@ -1,8 +1,8 @@
-"""The manipulability paper's numbers, homes, paths, controllers, and what is measured of a run."""
+"""The manipulability paper's runs and controllers, what is measured of a run, and random homes."""
 
 import json
-from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from itertools import product
 from typing import Any, Literal
 
 import numpy as np
@@ -12,80 +12,26 @@ from surgsim.metrics.optimality import attainable_manipulability
 from surgsim.scenario.schema import Scenario
 from surgsim.simulate.loop import Simulation
 from surgsim.simulate.setup import Setup, prepare
-from surgsim.studies.manipulability_validation.calibrate import HOMES_RAD, STEPS
+from surgsim.studies.attainable import attainable_by_timing
+from surgsim.studies.homes import RandomHome
+from surgsim.studies.manipulability_validation.calibrate import (
+    HOMES,
+    HOMES_RAD,
+    LIMITS_RAD,
+    PATHS,
+    STEPS,
+)
 from surgsim.studies.measures import outcome
-from surgsim.studies.study import Array, Curves, Paper, Printed, Results, SimulatedCase
-from surgsim.studies.tables import Row
-from surgsim.tasks.base import Feedback, Task, TimedTask, TipCommand
+from surgsim.studies.stepped import SteppedTask, acceleration_ratio, tip_errors
+from surgsim.studies.study import Array, Curves, Results, SimulatedCase
+from surgsim.studies.tables import Row, number, numbers, pairs
 from surgsim.tasks.profile import Profile
 from surgsim.trace.trace import Trace
-
-PATHS = ("circle", "sinusoid", "spiral")
-HOMES = (1, 2, 3, 4)
-
-
-def _by_path(*rows: tuple[float, ...]) -> dict[str, tuple[float, ...]]:
-    """Numbers of homes 1 to 4 by path."""
-    return dict(zip(PATHS, rows, strict=True))
-
-
-PAPER = Paper(
-    title="Experimental Validation of Manipulability Optimization Control of a 7-DoF Serial Manipulator for "
-    "Robot-assisted Surgery",
-    reference="Su et al.",
-    printed={
-        "pinv": Printed(
-            "Table 4, averages of mu, not optimised",
-            "m^3",
-            _by_path(
-                (0.0406, 0.0282, 0.0246, 0.0356),
-                (0.0447, 0.0281, 0.0222, 0.0233),
-                (0.0393, 0.0280, 0.0253, 0.0342),
-            ),
-        ),
-        "rnn": Printed(
-            "Table 4, averages of mu, optimised",
-            "m^3",
-            _by_path(
-                (0.0448, 0.0287, 0.0264, 0.0466),
-                (0.0512, 0.0303, 0.0249, 0.0363),
-                (0.0429, 0.0282, 0.0262, 0.0465),
-            ),
-        ),
-        "increase": Printed(
-            "Table 4, increase",
-            "m^3",
-            _by_path(
-                (0.0042, 0.0005, 0.0018, 0.0110),
-                (0.0065, 0.0022, 0.0027, 0.0130),
-                (0.0036, 0.0003, 0.0010, 0.0123),
-            ),
-        ),
-        "percent": Printed(
-            "Table 4, increase",
-            "%",
-            _by_path((10.3, 1.8, 7.3, 30.9), (14.5, 7.8, 12.2, 55.8), (9.2, 1.1, 3.9, 36.0)),
-        ),
-        "pinv_error": Printed(
-            "Table 5, root mean square tip errors, pseudo-inverse",
-            "1e-4 m",
-            _by_path(
-                (1.148, 1.189, 1.162, 1.161), (2.588, 2.062, 1.980, 3.760), (3.891, 3.818, 4.151, 3.590)
-            ),
-        ),
-        "rnn_error": Printed(
-            "Table 5, root mean square tip errors, optimised",
-            "1e-4 m",
-            _by_path(
-                (3.992, 3.876, 2.433, 1.967), (5.657, 5.074, 3.072, 3.398), (5.964, 4.934, 4.389, 3.778)
-            ),
-        ),
-    },
-)
 
 DURATION_S = 10.0
 PERIOD_S = DURATION_S / STEPS
 RAMP_S = {"paper": 1e-6, "smooth": 0.5}
+_SMOOTH = Profile(hold_start_s=0.0, duration_s=DURATION_S, ramp_s=RAMP_S["smooth"], hold_end_s=0.0)
 SAMPLES = 41
 TABLE_5_UNITS_PER_M = 1e4
 
@@ -96,11 +42,6 @@ RESOLVERS: dict[str, dict[str, Any]] = {
     "self_motion": {"type": "self_motion", "k_tip": 1.0 / PERIOD_S},
 }
 """The network is eq. (6)-(9), with constants that the paper does not print: see the page's conventions."""
-
-
-def table_4_averages(home: int) -> Array:
-    """Table 4's averages (6,): not optimised on circle, sinusoid and spiral, then optimised."""
-    return np.array([PAPER[name][path][home - 1] for name in ("pinv", "rnn") for path in PATHS])
 
 
 @dataclass(frozen=True)
@@ -116,6 +57,9 @@ class Cell(SimulatedCase):
         dh_variant: `literal` has d2 = 0.2 m.
         form: Signs of eq. (7), if not those of the derivation.
         constants: Constants of the network that are changed.
+        steps: Number of steps, N.
+        duration_s: Time of the path [s].
+        q_rad: Joint positions of a home that is none of the four [rad].
     """
 
     path: str
@@ -125,13 +69,22 @@ class Cell(SimulatedCase):
     dh_variant: Literal["standard", "literal"] = "standard"
     form: str | None = None
     constants: tuple[tuple[str, float], ...] = ()
+    steps: int = STEPS
+    duration_s: float = DURATION_S
+    q_rad: tuple[float, ...] = ()
+
+    @property
+    def period_s(self) -> float:
+        """Time of a step [s]."""
+        return self.duration_s / self.steps
 
     @property
     def label(self) -> str:
         """In words."""
         variant = ", d2 = 0.2" if self.dh_variant == "literal" else ""
         signs = f", eq. (7) {self.form} {dict(self.constants)}" if self.form else ""
-        return f"{self.path}, home {self.home}: {self.method}, {self.timing} timing{variant}{signs}"
+        steps = "" if self.steps == STEPS else f", {self.steps} steps in {self.duration_s:g} s"
+        return f"{self.path}, home {self.home}: {self.method}, {self.timing} timing{variant}{signs}{steps}"
 
     def scenario(self) -> Scenario:
         """The scenario.
@@ -145,12 +98,12 @@ class Cell(SimulatedCase):
             "robot": {"name": "lwr4plus", "dh_variant": self.dh_variant},
             "instrument": None,
             "theatre": False,
-            "start": {"q_rad": HOMES_RAD[self.home]},
+            "start": {"q_rad": self.q_rad or HOMES_RAD[self.home]},
             "plant": {"type": "kinematic"},
-            "simulation": {"timestep_s": PERIOD_S, "control_period_s": PERIOD_S},
+            "simulation": {"timestep_s": self.period_s, "control_period_s": self.period_s},
             "task": {
                 "type": self.path,
-                "duration_s": DURATION_S,
+                "duration_s": self.duration_s,
                 "ramp_s": RAMP_S[self.timing],
                 "hold_start_s": 0.0,
                 "hold_end_s": 0.0,
@@ -158,7 +111,7 @@ class Cell(SimulatedCase):
             "controller": {
                 "name": self.method,
                 "resolver": {**RESOLVERS[self.method], **form, **dict(self.constants)},
-                "position_gain_per_s": 10.0 if self.method == "self_motion" else 1.0 / PERIOD_S,
+                "position_gain_per_s": 10.0 if self.method == "self_motion" else 1.0 / self.period_s,
             },
         }
         return Scenario.model_validate_json(json.dumps(data))
@@ -166,7 +119,9 @@ class Cell(SimulatedCase):
     def setup(self) -> Setup:
         """Ready to run; with the paper's timing the task gives the velocity of eq. (2)."""
         setup = prepare(self.scenario())
-        return setup if self.timing == "smooth" else replace(setup, task=SteppedTask(setup.task))
+        return (
+            setup if self.timing == "smooth" else replace(setup, task=SteppedTask(setup.task, self.period_s))
+        )
 
     def run(self) -> Trace:
         """The trace."""
@@ -191,7 +146,7 @@ class Cell(SimulatedCase):
             "velocity_over_limit": float(np.max(np.abs(trace.block("v")) / limits["velocity"])),
             "acceleration_over_limit": acceleration_ratio(trace),
             "outcome": outcome(trace),
-            "last_step": round(trace.meta.ending.t_s / PERIOD_S),
+            "last_step": round(trace.meta.ending.t_s / self.period_s),
         }
 
     def curves(self, trace: Trace) -> Curves:
@@ -205,40 +160,10 @@ class Cell(SimulatedCase):
         return shown
 
 
-def tip_errors(trace: Trace) -> tuple[Array, Array]:
-    """Matched errors |p(k) - r(k)| and lagged ones |p(k-1) - r(k)| for k = 1..N [m].
-
-    Position and desired position of the same step; the new desired position against the position before it.
-    """
-    tip, wanted = trace.block("tip"), trace.block("tip_ref")[1:]
-    matched, lagged = (np.linalg.norm(p - wanted, axis=1) for p in (tip[1:], tip[:-1]))
-    return np.asarray(matched), np.asarray(lagged)
-
-
-def acceleration_ratio(trace: Trace) -> float:
-    """Largest change of joint velocity in one step, from rest on, over what the acceleration limit allows."""
-    steps = np.diff(trace.block("v"), axis=0) / trace.meta.control_period_s
-    return float(np.max(np.abs(steps) / np.array(trace.meta.limits["acceleration"])))
-
-
-def attainable(smooth: Iterable[Curves], ours: Curves) -> dict[str, Array]:
-    """Largest mu that self-motion reaches along a path, at every step (steps + 1,) of a run by its timing.
-
-    At each sample the largest that was found from any of the smooth runs, and by our run itself: the runs
-    have the same tip positions at the same rows, so that what one of them finds another could have reached.
-    Between samples mu* is interpolated linearly.
-    """
-    every, best = np.arange(STEPS + 1), np.max([curves["attainable"] for curves in smooth], axis=0)
-    mu = np.maximum(np.interp(every, ours["attainable_step"], best), ours["mu"])
-    profile = Profile(hold_start_s=0.0, duration_s=DURATION_S, ramp_s=RAMP_S["smooth"], hold_end_s=0.0)
-    progress = np.array([profile.progress(k * PERIOD_S)[0] for k in every])
-    return {"smooth": mu, "paper": np.interp(np.linspace(0.0, 1.0, STEPS + 1), progress, mu)}
-
-
 def upper_bound(results: Results, path: str, home: int) -> dict[str, Array]:
     """mu* along a path by timing (steps + 1,)."""
     pinv, ours = (results.of(Cell(path, home, method, "smooth")) for method in ("pinv", "self_motion"))
-    return attainable((pinv.curves, ours.curves), ours.curves)
+    return attainable_by_timing((pinv.curves, ours.curves), ours.curves, STEPS, _SMOOTH)
 
 
 PRINTED_NETWORKS = tuple(
@@ -255,23 +180,115 @@ PRINTED_NETWORKS = tuple(
 """Signs and constants of eq. (7) that are tried; the last is the study's."""
 
 
-class SteppedTask(TimedTask):
-    """A task whose velocity is the step to the next sample over the period, eq. (2).
+FEWER_AND_MORE = (500, 2000, 5000)
+"""Numbers of steps beside the paper's 1000."""
 
-    The mean velocity of a step, where the task itself gives the velocity at its beginning. With the latter
-    the tip would run along the tangents and off a curved path by about half a step.
-    """
 
-    def __init__(self, task: Task) -> None:
-        self._task = task
+def stepped(path: str, home: int, method: str, steps: int, same_time: bool) -> Cell:
+    """A cell in another number of steps, in the same time or with steps of the same time."""
+    return Cell(path, home, method, steps=steps, duration_s=DURATION_S if same_time else steps * PERIOD_S)
 
-    @property
-    def duration_s(self) -> float:
-        """Length of the whole task [s]."""
-        return self._task.duration_s
 
-    def command(self, t_s: float, feedback: Feedback | None = None) -> TipCommand:
-        """Desired position at `t_s` [s] and (r(k+1) - r(k)) / T."""
-        here = self._task.command(t_s).p_WTd
-        there = self._task.command(t_s + PERIOD_S).p_WTd
-        return TipCommand(p_WTd=here, v_WTd=(there - here) / PERIOD_S, a_WTd=np.zeros(3))
+DRAWN, DRAWN_QUICK, WANTED = 400, 3, 200
+"""How many random homes are drawn, in a quick run too, and how many are wanted of those that count."""
+
+
+@dataclass(frozen=True)
+class UnfittedHome(RandomHome):
+    """A random home; q7 moves neither flange nor mu."""
+
+    seed, ranges_rad, paths = 730126, tuple(map(float, LIMITS_RAD)), PATHS
+
+    def both(self) -> tuple[str, str]:
+        """Pseudo-inverse and network."""
+        return "pinv", "rnn"
+
+    def follow(self, path: str, method: str) -> Row:
+        """One run of the study from this home."""
+        return Cell(path, 0, method, q_rad=(*self.draw(), 0.0)).measured().row
+
+
+def printed_network(results: Results) -> list[Row]:
+    """Where the network ends with the signs of eq. (7) as printed and as derived; home 1, circle."""
+    return [
+        {
+            "eq_7": m.case.form,
+            **dict(m.case.constants),
+            **m.only("outcome", "last_step"),
+            "tip_error_rms_m": m.row["matched_rms_m"] if m.row["outcome"] == "completed" else None,
+            "tip_error_max_m": m.row["matched_max_m"],
+        }
+        for m in results["printed_network"]
+    ]
+
+
+def steps_table(results: Results) -> list[Row]:
+    """Increase by the network over the twelve cells in another number of steps, and the tip errors."""
+    rows: list[Row] = []
+    for same_time, steps in product((True, False), sorted((*FEWER_AND_MORE, STEPS))):
+        cells = [
+            stepped(*place, m, steps, same_time) for place in product(PATHS, HOMES) for m in ("pinv", "rnn")
+        ]
+        if cells[0] in results and cells[-1] in results:
+            found = [results.of(cell).row for cell in cells]
+            mu = np.array([number(row, "mu_mean") for row in found]).reshape(-1, 2)
+            tip = np.array([number(row, "matched_rms_m") for row in found]).reshape(-1, 2)
+            percent = 100.0 * (mu[:, 1] / mu[:, 0] - 1.0)
+            row: Row = {
+                "kept": "time of the path" if same_time else "time of a step",
+                "steps": steps,
+                "duration_s": cells[0].duration_s,
+                "least_percent": float(percent.min()),
+                "median_percent": float(np.median(percent)),
+                "most_percent": float(percent.max()),
+                **{f"{m}_rms_mm": 1e3 * float(np.median(tip[:, i])) for i, m in enumerate(("pinv", "rnn"))},
+            }
+            rows.append(row)
+    return rows
+
+
+def attainable_table(results: Results) -> list[Row]:
+    """How much of the attainable gain the network and our resolver reach, and our limits."""
+    rows: list[Row] = []
+    for (pinv, rnn), (start, ours) in zip(
+        pairs(results.rows("paper")), pairs(results.rows("smooth")), strict=True
+    ):
+        bound = upper_bound(results, str(pinv["path"]), int(number(pinv, "home")))
+        smooth, stepped = (float(np.mean(bound[timing][1:])) for timing in ("smooth", "paper"))
+        base, network, slow, best = (number(row, "mu_mean") for row in (pinv, rnn, start, ours))
+        limits = ("position_margin_rad", "velocity_over_limit", "acceleration_over_limit")
+        rows.append(
+            {
+                "path": pinv["path"],
+                "home": pinv["home"],
+                "pinv": slow,
+                "self_motion": best,
+                "attainable": smooth,
+                "fraction_rnn": (network - base) / (stepped - base),
+                "fraction_self_motion": (best - slow) / (smooth - slow),
+                "tip_rms_m": ours["matched_rms_m"],
+                "tip_max_m": ours["matched_max_m"],
+                **{name: ours[name] for name in limits},
+                "pinv_paper_timing_acceleration": pinv["acceleration_over_limit"],
+                "outcome": ours["outcome"],
+            }
+        )
+    return rows
+
+
+def increase_percent(pinv: Row, rnn: Row, column: str = "mu_mean") -> float:
+    """By how much the second one has more [%]."""
+    return 100.0 * (number(rnn, column) / number(pinv, column) - 1.0)
+
+
+def variants(results: Results) -> list[Row]:
+    """The same homes with d2 = 0.2 m as printed, and the 6x7 mu of the standard runs."""
+    rows: list[Row] = []
+    for standard, literal in zip(pairs(results.rows("paper")), pairs(results.rows("literal")), strict=False):
+        row = {name: standard[0][name] for name in ("path", "home")}
+        kinds = (("standard", standard, ""), ("d2_literal", literal, ""), ("6x7", standard, "6d_"))
+        for name, (pinv, rnn), kind in kinds:
+            row |= {f"{name}_pinv": pinv[f"mu_{kind}mean"], f"{name}_rnn": rnn[f"mu_{kind}mean"]}
+            row[f"{name}_increase_percent"] = increase_percent(pinv, rnn, f"mu_{kind}mean")
+        rows.append({**row, "d2_literal_margin_rad": min(numbers(literal, "position_margin_rad"))})
+    return rows

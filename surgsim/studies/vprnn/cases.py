@@ -1,21 +1,21 @@
 """The VPRNN paper's numbers, the controllers, what the arm has that they do not know, and the arm's runs."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import product
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from surgsim.metrics.accuracy import rms
 from surgsim.metrics.optimality import attainable_manipulability
 from surgsim.scenario.load import load_scenario
 from surgsim.scenario.schema import Scenario
-from surgsim.simulate.loop import Simulation
-from surgsim.simulate.setup import prepare
-from surgsim.studies.figure import BLUE, GREEN, ORANGE, PURPLE, VERMILLION
-from surgsim.studies.measures import Spread, decay_rate, outcome, within_from_s
+from surgsim.studies.figure import BLACK, BLUE, GREEN, ORANGE, PURPLE, VERMILLION
+from surgsim.studies.levels import NOMINAL, Level
+from surgsim.studies.measures import tracking
+from surgsim.studies.stages import LedThenTracking
+from surgsim.studies.starts import RandomStart, Spread
 from surgsim.studies.study import Curves, Paper, Printed, Results, SimulatedCase
-from surgsim.studies.tables import Cell, Row, groups, numbers, pick
+from surgsim.studies.tables import Cell, Row, number
 from surgsim.trace.trace import Trace
 
 PAPER = Paper(
@@ -31,12 +31,13 @@ PAPER = Paper(
 
 
 class Method(NamedTuple):
-    """A controller of the comparison: name in tables, shipped controller, colour and style of lines."""
+    """A controller: name in tables, shipped controller, colour and style of lines, what is changed of it."""
 
     label: str
     controller: str
-    colour: str
+    colour: str = BLACK
     style: Any = "-"
+    keys: tuple[str, ...] = ()
 
 
 METHODS: dict[str, Method] = {
@@ -45,38 +46,16 @@ METHODS: dict[str, Method] = {
     "vprnn": Method("VPRNN", "vprnn", PURPLE),
     "rcm_inverse_dynamics": Method("rcm_inverse_dynamics (ours)", "rcm_inverse_dynamics", GREEN),
     "self_motion": Method("self_motion (ours)", "self_motion", ORANGE, (0, (5, 1))),
+    "rnn_tip": Method("RNN without RCM rows", "rnn", keys=("controller.resolver.rcm=false",)),
+    **{name: Method(name, name) for name in ("pinv", "qp", "mink")},
 }
-"""The paper's three controllers, then ours."""
 PAPER_METHODS = ("nullspace", "rnn", "vprnn")
+COMPARED = (*PAPER_METHODS, "rcm_inverse_dynamics", "self_motion")
+"""In figures 4 to 8: the paper's three controllers, then ours."""
 LABEL = {name: method.label for name, method in METHODS.items()}
 
 
-@dataclass(frozen=True)
-class Level:
-    """What the arm has and the controller's model does not.
-
-    Attributes:
-        payload_kg: Mass fixed to the tip adapter [kg].
-        coulomb_nm: Dry friction of every joint [N m].
-    """
-
-    payload_kg: float = 0.0
-    coulomb_nm: float = 0.0
-
-    def __str__(self) -> str:
-        """In words."""
-        both = f"payload {self.payload_kg:g} kg, friction {self.coulomb_nm:g} N m"
-        return "nominal" if self == NOMINAL else both
-
-    @property
-    def disturbances(self) -> str:
-        """The scenario's `disturbances` as YAML."""
-        payload = [f"{{type: payload, mass_kg: {self.payload_kg}}}"] if self.payload_kg else []
-        friction = [f"{{type: joint_friction, coulomb_nm: {self.coulomb_nm}}}"] if self.coulomb_nm else []
-        return f"disturbances=[{', '.join(payload + friction)}]"
-
-
-NOMINAL, PAPER_SIZE = Level(), Level(0.5, 0.5)
+PAPER_SIZE = Level(0.5, 0.5)
 """With the second the errors of VPRNN are of the size of the paper's figures, see the ladder."""
 LEVELS = (NOMINAL, PAPER_SIZE)
 PAYLOADS_KG = (0.0, 0.25, 0.5, 0.75, 1.0)
@@ -88,19 +67,21 @@ OURS = tuple(
     if 0.0 in (level.payload_kg, level.coulomb_nm) or level in (Level(1.0, 0.5), Level(1.0, 5.0))
 )
 """The ladder: VPRNN at every combination, ours at each error alone and at two of the corners."""
+ERRORS = ("tip_rms_mm", "tip_max_mm", "rcm_rms_mm", "rcm_max_mm")
 SAMPLES = 45
 EVERY = 10
 """Rows between points that are drawn of a sinusoid; 10 ms."""
 UNMET_M_PER_S = 1e-3
 
 
+_FIXED = ("theatre=false", "safety.rcm_error_max_m=null", "safety.stop_at_collision=false")
+
+
 def sinusoid(method: str, level: Level = NOMINAL, keys: tuple[str, ...] = ()) -> Scenario:
     """The sinusoid with a controller; no RCM error stops a run, however far off the skin is passed."""
-    stops = ("safety.rcm_error_max_m=null", "safety.stop_at_collision=false")
-    fixed = ("theatre=false", *stops, level.disturbances)
-    return load_scenario(
-        "sinusoid_lwr4plus", controller=METHODS[method].controller, assignments=[*fixed, *keys]
-    )
+    found = METHODS[method]
+    assignments = (*_FIXED, level.disturbances, *found.keys, *keys)
+    return load_scenario("sinusoid_lwr4plus", controller=found.controller, assignments=assignments)
 
 
 @dataclass(frozen=True)
@@ -127,20 +108,19 @@ class Sinusoid(SimulatedCase):
 
         The share of mu is of what self-motion could reach at the run's own tip.
         """
-        trace = trace.active()
-        tip, rcm, mu = 1e3 * trace["tip_error_m"], 1e3 * trace["rcm_error_m"], trace["manipulability"]
-        inside = tip.max() <= PAPER["tip_bound"] and rcm.max() <= PAPER["rcm_bound"]
+        found, trace = tracking(trace), trace.active()
+        mu, largest = trace["manipulability"], (number(found, "tip_max_mm"), number(found, "rcm_max_mm"))
+        inside = largest[0] <= PAPER["tip_bound"] and largest[1] <= PAPER["rcm_bound"]
         row: dict[str, Cell] = {
             "level": str(self.level),
             "controller": LABEL[self.method],
             "payload_kg": self.level.payload_kg,
             "friction_nm": self.level.coulomb_nm,
-            "outcome": outcome(trace),
-            "end_s": trace.meta.ending.t_s,
-            **{f"{name}_rms_mm": rms(error) for name, error in (("tip", tip), ("rcm", rcm))},
-            **{f"{name}_max_mm": float(error.max()) for name, error in (("tip", tip), ("rcm", rcm))},
+            **found,
+            "duration_s": float(trace.meta.scenario["task"]["duration_s"]),
+            "torque_law": trace.meta.scenario["controller"]["torque_law"]["type"],
+            "evaluated_at": trace.meta.scenario["controller"]["evaluate_at"],
             "within_5_and_15_mm": "yes" if inside else "no",
-            "mu_mean": float(np.mean(mu)),
             "mu_end": float(mu[-1]),
         }
         if self._shown:
@@ -168,6 +148,9 @@ class Sinusoid(SimulatedCase):
         }
 
 
+KINEMATIC = ("plant.type=kinematic",)
+
+
 class Gains(NamedTuple):
     """Changed gains, run under torques and where `kinematic` also with perfect velocity tracking.
 
@@ -184,7 +167,7 @@ class Gains(NamedTuple):
     @property
     def cases(self) -> list[Sinusoid]:
         """The runs."""
-        plants = ((), ("plant.type=kinematic",)) if self.kinematic else ((),)
+        plants = ((), KINEMATIC) if self.kinematic else ((),)
         return [Sinusoid(self.method, NOMINAL, (*self.keys, *plant)) for plant in plants]
 
 
@@ -213,54 +196,37 @@ VARIANTS = (
 )
 
 
+def gains_table(results: Results) -> list[Row]:
+    """Every variant under torques, and where it makes sense with perfect velocity tracking."""
+    rows: list[Row] = []
+    for gains in (gains for gains in VARIANTS if gains.cases[0] in results):
+        torques, *kinematic = [results.of(case) for case in gains.cases]
+        named = {"variant": gains.variant, "climbing_rate": gains.rate}
+        ideal = {"mu_mean_kinematic": kinematic[0].row["mu_mean"] if kinematic else None}
+        rows.append({**named, **torques.only(*ERRORS, "mu_mean"), **ideal})
+    return rows
+
+
 def integrated(plant: str, form: str) -> Sinusoid:
     """VPRNN with Table I at 1 kHz on a plant, the network integrated in one of two forms."""
     return Sinusoid("vprnn", NOMINAL, (f"plant.type={plant}", f"{_RESOLVER}.integration={form}"))
 
 
 SPREADS = {"near": Spread(0.015, (5.0, 20.0), (1.0, 10.0)), "far": Spread(0.1, (50.0, 100.0), (10.0, 50.0))}
-SEEDS = tuple(range(20))
 STARTED = ("nullspace", "rnn", "vprnn", "rcm_inverse_dynamics")
-WATCHED_S, SHOWN, LEFT, CONVERGED_MM = 3.0, 8, 0.05, 1.0
+WATCHED_S, SHOWN = RandomStart.watched_s, 8
 
 
 @dataclass(frozen=True)
-class Start(SimulatedCase):
+class Start(RandomStart):
     """A random initial configuration, the path's start held."""
 
-    method: str
-    plant: str
-    spread: str
-    seed: int
+    spreads, names = SPREADS, LABEL
 
     def scenario(self) -> Scenario:
         """The start held for longer than is watched."""
         keys = (f"task.hold_start_s={WATCHED_S + 1.0}", f"plant.type={self.plant}")
         return sinusoid(self.method, NOMINAL, keys)
-
-    def run(self) -> Trace:
-        """The first seconds."""
-        setup = prepare(self.scenario())
-        simulation = Simulation(replace(setup, q_start=SPREADS[self.spread].draw(setup, self.seed)))
-        simulation.advance(round(WATCHED_S / setup.scenario.simulation.control_period_s))
-        return simulation.trace()
-
-    def measures(self, trace: Trace) -> Row:
-        """Displacement, convergence to 1 mm, equivalent rates."""
-        t, done = trace["t_s"], outcome(trace) == "completed"
-        found = {"tip": 1e3 * trace["tip_error_m"], "rcm": 1e3 * trace["rcm_error_m"]}
-        near = {name: within_from_s(t, e, CONVERGED_MM) for name, e in found.items()}
-        return {
-            "controller": LABEL[self.method],
-            "plant": self.plant,
-            "spread": self.spread,
-            "seed": self.seed,
-            "outcome": outcome(trace),
-            **{f"{name}_start_mm": float(e[0]) for name, e in found.items()},
-            **{f"{name}_1_mm_from_s": time if done else None for name, time in near.items()},
-            **{f"{name}_rate_per_s": decay_rate(t, e, LEFT) if done else None for name, e in found.items()},
-            **{f"{name}_end_mm": float(e[-1]) for name, e in found.items()},
-        }
 
     def curves(self, trace: Trace) -> Curves:
         """Both errors of the starts that are shown, every 5 ms."""
@@ -269,18 +235,60 @@ class Start(SimulatedCase):
         return {name: trace[name][::5] for name in ("t_s", "tip_error_m", "rcm_error_m")}
 
 
-_MEDIANS = ("tip_1_mm_from_s", "rcm_1_mm_from_s", "tip_rate_per_s", "rcm_rate_per_s")
+DURATIONS_S = (10.0, 4.0, 2.0)
+"""Of the sinusoid: this study's, and faster ones; the paper gives none."""
+RESOLVED = ("vprnn", "rnn", "rnn_tip", "nullspace", "pinv", "qp", "mink", "self_motion")
 
 
-def starts_table(results: Results) -> list[Row]:
-    """Counts, medians and the slowest of each group; a run that fails is counted, not averaged."""
-    table: list[Row] = []
-    for key, rows in groups(results.rows("starts"), "plant", "spread", "controller").items():
-        values = {name: numbers(rows, name) for name in _MEDIANS}
-        both = [row for row in rows if None not in (row["tip_1_mm_from_s"], row["rcm_1_mm_from_s"])]
-        counts = {"completed": len(pick(rows, outcome="completed")), "converged": len(both)}
-        medians = {f"{name}_median": float(np.median(v)) if v else None for name, v in values.items()}
-        slowest = {f"{name}_slowest": max(values[name], default=None) for name in _MEDIANS[:2]}
-        named = dict(zip(("plant", "spread", "controller"), key, strict=True))
-        table.append({**named, "runs": len(rows), **counts, **medians, **slowest})
-    return table
+class Law(NamedTuple):
+    """A torque law with its shipped gains, and where the resolver above it is evaluated."""
+
+    name: str
+    at: str = "measured"
+
+
+LAWS = (
+    Law("hierarchical_impedance"),
+    *(
+        Law(name, at)
+        for name in ("joint_impedance", "joint_elastic_dynamics")
+        for at in ("reference", "measured")
+    ),
+    *map(Law, ("projected_jacobian", "null_space_basis", "constraint_consistent")),
+    *map(Law, ("rcm_inverse_dynamics", "rcm_elastic_dynamics", "rcm_mpc")),
+)
+LAW_DURATIONS_S = DURATIONS_S[:2]
+
+
+def resolved(method: str, duration_s: float, law: Law | None = None) -> Sinusoid:
+    """A resolver along the sinusoid over a torque law, or on the kinematic plant."""
+    over: tuple[str, ...] = KINEMATIC
+    if law is not None:
+        over = (f"{_LAW}={{type: {law.name}}}", f"controller.evaluate_at={law.at}")
+    return Sinusoid(method, NOMINAL, (f"task.duration_s={duration_s:g}", *over))
+
+
+@dataclass(frozen=True)
+class Inserted(LedThenTracking):
+    """A hand leads the instrument through the port, then the tip goes to the sinusoid and follows it."""
+
+    method: str
+
+    @property
+    def name(self) -> str:
+        """The controller."""
+        return LABEL[self.method]
+
+    def stages(self) -> tuple[Scenario, Scenario]:
+        """The shipped insertion, its target the start of the path, and the shipped sinusoid.
+
+        A disturbance observer would hold against the hand: `rcm_inverse_dynamics` is led as the shipped
+        insertion has it, without.
+        """
+        tracked = sinusoid(self.method)
+        held = tracked.model_dump()
+        path, port = held["task"]["start_m"], held["trocar"]["position_m"]
+        target = [round(a - b, 9) for a, b in zip(path, port, strict=True)]
+        keys = (*_FIXED, f"task.target_from_port_m={target}", "task.duration_s=20")
+        named = None if self.method == "rcm_inverse_dynamics" else METHODS[self.method].controller
+        return load_scenario("hands_on_insertion_lwr4plus", controller=named, assignments=keys), tracked

@@ -10,18 +10,19 @@ from scipy.integrate import solve_ivp
 from surgsim.control.failure import ControlFailure
 from surgsim.control.manipulability import log_manipulability_gradient
 from surgsim.control.null_space import least_velocity
-from surgsim.control.problem import VelocityProblem, stacked_rows, velocity_bounds
-from surgsim.control.rcm import rcm_kinematics
+from surgsim.control.problem import VelocityProblem, stacked_rows
 from surgsim.control.resolvers.rnn import RnnConfig
 from surgsim.control.resolvers.vprnn import VprnnConfig
 from surgsim.control.resolvers.vprnn_system import Network
+from surgsim.display import count
 from surgsim.models.arm import ArmModel
 from surgsim.scenario.load import load_controller
 from surgsim.simulate.setup import prepare
 from surgsim.studies.figure import BLUE, PURPLE, VERMILLION, Axes, formula, label
 from surgsim.studies.measures import within_from_s
-from surgsim.studies.study import Array, Case, Measured, Results
-from surgsim.studies.tables import Row, Tables
+from surgsim.studies.still import still_problem
+from surgsim.studies.study import Array, Case, Judged, Measured, Results, holds
+from surgsim.studies.tables import Row, Tables, number, numbers, pick, span
 from surgsim.studies.vprnn.cases import METHODS, PAPER, sinusoid
 
 PERIOD_S = 1e-3
@@ -30,7 +31,7 @@ Z_SPREAD = 10.0
 BOUNDS: tuple[float | None, ...] = (None, 1.0)
 EULER = tuple((beta, period) for beta in (100.0, 1000.0) for period in (1e-3, 5e-4, 1e-4))
 LEFT = 0.01
-_AT_S = 3.0
+_AT_S, EULER_S = 3.0, 0.05
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -58,25 +59,7 @@ class Instant:
 def instant() -> Instant:
     """The arm at its start configuration, with the command of 3 s as the offset to follow."""
     setup = prepare(sinusoid("vprnn"))
-    state = setup.plant.reset(setup.q_start)
-    gain = setup.scenario.controller.position_gain_per_s
-    lower, upper = velocity_bounds(state.q, setup.arm.limits, gain)
-    command, here = setup.task.command(_AT_S), setup.arm.kinematics(state.q)
-    problem = VelocityProblem(
-        t_s=0.0,
-        dt_s=PERIOD_S,
-        q=state.q,
-        v=state.v,
-        kin=here,
-        command=replace(command, p_WTd=here.p_WT),
-        rcm=rcm_kinematics(here, state.p_WC, state.v_WC),
-        p_WC=state.p_WC,
-        v_WC=state.v_WC,
-        lower=lower,
-        upper=upper,
-        limits=setup.arm.limits,
-        position_gain_per_s=gain,
-    )
+    problem = still_problem(setup, _AT_S, PERIOD_S)
     vprnn, rnn = (load_controller(name).resolver for name in ("vprnn", "rnn"))
     assert isinstance(vprnn, VprnnConfig)
     assert isinstance(rnn, RnnConfig)
@@ -249,6 +232,29 @@ class Euler(Case):
         for t in times:
             delta = net.decay(delta, float(t), self.period_s)
         return float(np.linalg.norm(delta))
+
+
+def judge_euler(tables: Tables) -> Judged:
+    """Whether Euler breaks where it must, and the arm with it."""
+    rows, arm = tables["euler"], pick(tables["euler_arm"], integration="euler")
+    off = [number(row, "grows_from_s") - number(row, "limit_ln_2_over_T_beta_s") for row in rows]
+    wanted = {"euler": "diverged", "exact": "completed"}
+    ended = all(row["outcome"] == wanted[str(row["integration"])] for row in tables["euler_arm"])
+    ends = ", ".join(f"{row['plant']} plant at {number(row, 'end_s'):.2f} s" for row in arm)
+    return holds(max(abs(x) for x in off) < EULER_S and ended), (
+        f"delta grows from {span(off, 2)} s after that time for {count(len(off), 'pair')} of T and beta; "
+        f"with Table I at 1 kHz the run ends as diverged: {ends}"
+    )
+
+
+def judge_steady_state(tables: Tables) -> Judged:
+    """Whether both networks end at the formula."""
+    rows = tables["network_rates"]
+    vprnn, rnn = (max(numbers(rows, f"{name}_end_deviation")) for name in ("vprnn", "rnn"))
+    return holds(max(vprnn, rnn) < 1e-9), (
+        f"VPRNN to {vprnn:.0e}, RNN to {rnn:.0e}, from {count(len(rows), 'random state')}: "
+        "h2, h3 and h4 vanish where the rows are met"
+    )
 
 
 def draw_networks(axes: Axes, results: Results, _: Tables) -> None:

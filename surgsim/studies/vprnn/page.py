@@ -14,13 +14,15 @@ from surgsim.studies.figure import (
     PURPLE,
     VERMILLION,
     Axes,
-    formula,
     heat_map,
     label,
 )
+from surgsim.studies.stages import draw_stages
+from surgsim.studies.starts import draw_starts
 from surgsim.studies.study import Array, Figure, Measured, Results, Section
 from surgsim.studies.tables import Row, Tables, number, numbers, pick
 from surgsim.studies.vprnn.cases import (
+    COMPARED,
     FRICTIONS_NM,
     LABEL,
     LEVELS,
@@ -30,7 +32,6 @@ from surgsim.studies.vprnn.cases import (
     PAYLOADS_KG,
     SHOWN,
     STARTED,
-    WATCHED_S,
     Sinusoid,
 )
 from surgsim.studies.vprnn.networks import cross_form_rank, draw_euler, draw_networks, instant
@@ -52,7 +53,7 @@ def _style(name: str) -> dict[str, Any]:
 def _over_time(axes: Axes, results: Results, values: Callable[[Measured], Array]) -> None:
     """Every controller over time, a panel for each level."""
     for ax, level in zip(axes.flat, LEVELS, strict=True):
-        for name in METHODS:
+        for name in COMPARED:
             found = results.of(Sinusoid(name, level))
             ax.plot(found.curves["t_s"], values(found), **_style(name))
 
@@ -63,7 +64,7 @@ def _tracking(axes: Axes, results: Results, _: Tables) -> None:
         for ax, i, axis in ((row[0], 1, "y"), (row[1], 2, "z")):
             wanted = 1e3 * (results.of(Sinusoid("vprnn", level)).curves["tip_ref"] - start)
             ax.plot(*wanted[:, [0, i]].T, color="0.75", linewidth=5.0, label="desired")
-            for name in METHODS:
+            for name in COMPARED:
                 tip = 1e3 * (results.of(Sinusoid(name, level)).curves["tip"] - start)
                 ax.plot(*tip[:, [0, i]].T, **_style(name))
             ax.set(title=str(level), ylabel=f"{axis} from the start (mm)")
@@ -144,21 +145,8 @@ def _alone(ax: Axes, rows: list[Row], axis: str) -> None:
     ax.set_ylim(1e-5, 3e3)
 
 
-def _starts(axes: Axes, results: Results, _: Tables) -> None:
-    t = np.linspace(0.0, WATCHED_S, 50)
-    for column, name in zip(axes.T, STARTED, strict=True):
-        near = [found.curves for found in results["starts"] if found.case.method == name and found.curves]
-        for ax, error, size in zip(column, ("tip_error_m", "rcm_error_m"), (20.0, 10.0), strict=True):
-            for curves in near:
-                style = {"color": METHODS[name].colour, "linewidth": 0.8, "alpha": 0.6}
-                ax.semilogy(curves["t_s"], 1e3 * curves[error], **style)
-            formula(ax, t, size * np.exp(-5.0 * t), "exp(-k t), k1 = k2 = 5 1/s")
-            ax.set_ylim(1e-4, 60.0)
-    label(axes, _TIME, ["tip error (mm)", "RCM error (mm)"], [LABEL[name] for name in STARTED])
-    axes[0, 0].legend(frameon=False, fontsize=9.5, loc="upper right")
-
-
 _NOT, _ALL, _Y, _WIDE = "Not in the paper:", (True, True), (False, True), ((1, 2), (11.5, 5.0))
+_F3 = "Figure 3: a hand leads the instrument through the port, then the tip goes to the path and follows it"
 _F5, _F6 = r"Figure 5: end-effector error $E_\mathrm{end}$", r"Figure 6: RCM error $\|E_\mathrm{rcm}\|$"
 _F7 = "Figure 7: manipulability µ, and the largest that self-motion could reach"
 _CLIMB = f"{_NOT} mean µ over the climbing rate k of q' = pinv(J) v + k N grad(ln µ)"
@@ -166,17 +154,20 @@ _STILL = f"{_NOT} the networks alone, from random states, on a problem that stan
 _BREAKS = f"{_NOT} explicit Euler of eq. (29) breaks at t = ln(2/(Tβ)) (dashed)"
 _RANDOM = f"{_NOT} {SHOWN} random initial configurations under torques, the path's start held"
 _ROWS = (2, len(STARTED))
+_LINES = {name: _style(name) for name in STARTED}
+_NEAR = {name: (LABEL[name], METHODS[name].colour) for name in STARTED}
 FIGURES = (
     Figure("figure_04.png", "Figure 4: trajectory tracking", _tracking, (2, 2), (12.5, 7.0), (True, False)),
     Figure("figure_05.png", f"{_F5} (logarithmic)", partial(_error, "tip", _TIP_MM), *_WIDE, _ALL),
     Figure("figure_06.png", f"{_F6} (logarithmic)", partial(_error, "rcm", _RCM_MM), *_WIDE, _ALL),
     Figure("figure_07.png", _F7, _manipulability, *_WIDE, _ALL),
     Figure("figure_08.png", "Figure 8: joint angles with VPRNN", _joints, *_WIDE, _Y),
+    Figure("figure_03.png", _F3, partial(draw_stages, _LINES), (1, 3), (12.0, 4.2)),
     Figure("gains.png", _CLIMB, _gains, (1, 2), (11.0, 4.6), _Y),
     Figure("ladder.png", f"{_NOT} errors that payload and friction make", _ladder, (2, 2), (11.5, 8.4)),
     Figure("networks.png", _STILL, draw_networks, (1, 2), (11.0, 4.6), _Y),
     Figure("euler.png", _BREAKS, draw_euler, (1, 2), (11.0, 4.4), _Y),
-    Figure("starts.png", _RANDOM, _starts, _ROWS, (11.5, 6.0), (True, "row")),
+    Figure("starts.png", _RANDOM, partial(draw_starts, _NEAR), _ROWS, (11.5, 6.0), (True, "row")),
 )
 
 INTRODUCTION = """\
@@ -185,8 +176,8 @@ scenario `sinusoid_lwr4plus`. Two controllers of surgsim run beside them. Everyt
 
     {command}
 
-with {versions}. The CSV files hold every table with nine digits; only `starts_every_run.csv` is
-not shown."""
+with {versions}. The CSV files hold every table with nine digits; only `starts_every_run.csv` and
+`laws_every_run.csv` are not shown."""
 _COMPARISON = f"""## Figures 4 to 8: the comparison
 
 Nominal means that the controller's model of the arm is exact. The paper's arm was a real one, with friction
@@ -203,15 +194,39 @@ With v the right side of eq. (20) and J = [J_T; J_rcm], the constrained optimum 
 
 since the terms of h2, h3 and h4 vanish where the constraints hold, and (J_T <> h) psi is grad(ln µ). The
 steady state of Jin's network is the same with c3/c2, and Nullspace is the same with its gain. So the three
-differ by one number, the climbing rate: 0.01 for VPRNN and 1 for RNN with Table I. VPRNN climbs a hundred
-times slower than RNN, and at equal rates they coincide
-(at 10, Nullspace's gradient is cut at the joints' velocity limits). VPRNN's tip and RCM errors, nominally
-1 % below the other two's by RMS, are those of not climbing at all (gain 0).
+differ by one number, the climbing rate: 0.01 for VPRNN and 1 for RNN with Table I. At equal rates they
+coincide (at 10, Nullspace's gradient is cut at the joints' velocity limits). VPRNN's tip and RCM errors,
+nominally 1 % below the other two's by RMS, are those of not climbing at all (gain 0).
 
 Under torques, the resolver's velocity enters the law only through K_N2 and D_N2 in the null space of [tip;
 RCM]. Tip and RCM error are set by K_X, D_X, K_N and D_N: with K_N2 = D_N2 = 0, which cuts the resolver off,
-they stay as they are. RNN without RCM rows is the network of Jin et al. as Table I lists it, which has
-neither h3 nor k2."""
+they stay as they are."""
+_RESOLVERS = """## The resolvers on exact joints
+
+With perfect velocity tracking (the kinematic plant) tip and RCM error are the resolver's own. RNN as Table I
+lists it has neither h3 nor k2, so no RCM rows: its shaft leaves the trocar. With them its network, of time
+constant epsilon = 1 ms, follows v late, the more the faster the path, and rings at the start. VPRNN's delta,
+stepped in closed form, is zero after some milliseconds whatever v does: VPRNN beats RNN in tip and RCM
+error. So do pinv and Nullspace, which have no network, with the same figures; what is left is the sampling.
+In 2 s `qp` meets its acceleration bounds, which the others do not have, and leaves the path."""
+_LAWS = """## Which torque law lets a resolver be seen
+
+Every resolver over every torque law with its shipped gains, k1 = k2 = 5 1/s, model exact. `evaluated at`:
+the resolver's kinematics are those of the measured joints, or of its own reference, as in a position-
+controlled arm. Columns of RNN are its difference from VPRNN. Two are told apart if RMS tip or RCM error
+differ by more than 10 % and 1 µm. Over a law that closes tip and RCM loops of its own, as the paper's
+hierarchical_impedance does, a resolver has only the null space of both, and at most the speed of
+`self_motion` is seen. A law that follows the joint reference shows it: RNN without RCM rows is 130 mm off,
+and RNN is told from VPRNN where the law's own error is smaller than the difference."""
+_HANDS_ON = """## Figure 3: hands-on insertion, then tracking
+
+Section IV has two steps: a user leads the robot through the incision, then it tracks on its own. Here a hand
+(300 N/m, with tremor) leads the adapter 18 cm down the port's axis while the controller holds the axis and
+gives way along it; it lets go, the tip goes to the start of the sinusoid (`led`), and the sinusoid begins
+from the posture of that moment (`tracked`), at rest: `switch` has the velocity that was left and the errors
+that the tracking begins with. rcm_inverse_dynamics is led without its observer, which would hold against the
+hand. RCM errors before the tip is inside are those of the shaft's axis. Not covered: the person, the hand
+being a spring on a planned way, and the second user, who may stop the robot."""
 _LADDER = """## Payload and friction
 
 Largest errors with a payload at the tip adapter and Coulomb friction in every joint, neither known to the
@@ -251,10 +266,7 @@ Its curves are pictures without numbers, so that only its bounds of 5 mm and 15 
 _CHOSEN = (
     ("gain of Nullspace", "1 rad²/s on grad(ln µ); 0 to 10 in the table of gains"),
     ("λ = 0.5 in Table I's RNN", "not defined anywhere in the paper; not used"),
-    (
-        "RCM rows of RNN",
-        "Table I gives neither h3 nor k2: c0 of the tip rows, k2 = 5 1/s; without them in the table of gains",
-    ),
+    ("RCM rows of RNN", "Table I gives neither h3 nor k2: c0 of the tip rows, k2 = 5 1/s; without them too"),
     ("constants of RNN", "c3 = h0, c2 = h1, c0 = h2, c1 = h4, epsilon = 1/beta"),
     ("bounds of eq. (28)", "linear activation; 1 in the table of Theorem 1"),
     (
@@ -272,8 +284,11 @@ def _theorem(_: Tables) -> str:
 
 
 SECTIONS = (
+    Section(_HANDS_ON, "hands_on", ("figure_03.png",), 3),
     Section(_COMPARISON, "comparison", tuple(f"figure_0{i}.png" for i in range(4, 9))),
     Section(_GAINS, "gains", ("gains.png",)),
+    Section(_RESOLVERS, "resolvers"),
+    Section(_LAWS, "laws", digits=3),
     Section(_LADDER, "ladder", ("ladder.png",)),
     Section(_NETWORKS, "network_rates", ("networks.png",)),
     Section(_theorem, "theorem_1"),
