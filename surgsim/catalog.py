@@ -35,6 +35,11 @@ class Surroundings(Protocol):
         ...
 
     @property
+    def has_force_sensor(self) -> bool:
+        """Whether there is a force-torque sensor at the flange."""
+        ...
+
+    @property
     def has_drives(self) -> bool:
         """Whether the arm's joints have motors behind elastic gears."""
         ...

@@ -12,8 +12,12 @@ WHOLE = ("theatre_lwr4plus", "theatre_ideal_lwr4plus", "teleop_free_motion_panda
 """Scenarios that are measured with their own controller."""
 KINEMATIC = ("pinv", "gradient", "vprnn", "qp")
 """Controllers that are measured on the kinematic plant too."""
-_WALL = ("trocar.wall={}",)
-_NEEDS = {"rcm_interaction_force": _WALL, "rcm_port_admittance": _WALL}
+_WALL, _SENSOR = "trocar.wall={}", "disturbances=[{type: force_torque_sensor}]"
+_NEEDS = {
+    "rcm_interaction_force": (_WALL,),
+    "rcm_port_admittance": (_WALL, _SENSOR),
+    "hands_on_admittance": (_SENSOR,),
+}
 """What a controller needs in the scenario to be run at all."""
 OUTSIDE = ("external_torque", "external_velocity")
 """Controllers that need a program: a figure of theirs would be that program's."""

@@ -116,6 +116,7 @@ class Account(Record):
         work: Of the motors' torques.
         loss: In friction, ripple and gears.
         given: To the links.
+        rubbed: Of that, lost in their dry friction.
         stored_at_start: In gears and rotors.
     """
 
@@ -123,6 +124,7 @@ class Account(Record):
     work: float
     loss: float
     given: float
+    rubbed: float
     stored_at_start: float
 
 
@@ -321,6 +323,7 @@ def _substep(
         account.work += hs * motor[i] * speed
         account.loss += hs * (taken[i] * speed + D[i] * (speed - link) * (speed - link))
         account.given += hs * torque * link
+        account.rubbed += hs * rubbed[i] * link
         torque -= damping[i] * link + rubbed[i]
         mean[i] += torque
         momentum[i] += rest[i] + torque
@@ -430,7 +433,7 @@ def record(gains: Array, world: World, memory: Array, out: Array) -> int:
         out[n + i] = omega[i]
         stored += 0.5 * (K[i] * s * s + B[i] * omega[i] * omega[i])
     out[2 * n], out[2 * n + 1], out[2 * n + 2] = account.work, account.loss, stored
-    out[2 * n + 3] = account.given
+    out[2 * n + 3], out[2 * n + 4] = account.given, account.rubbed
     return GOES_ON
 
 
@@ -439,7 +442,7 @@ class JointDrives(PlantPart):
 
     Records the gears' torques `joint_torque`, the motors' speeds `motor_speed`, and since the start the work
     of the motors, their loss, the energy in rotors and gears, and that given to the links: work is the sum of
-    the other three.
+    the other three. What the links' dry friction takes of the last is beside them.
 
     Args:
         config: The drives, whole: see `DriveConfig.on`.
@@ -479,7 +482,7 @@ class JointDrives(PlantPart):
         self.columns = (
             joints("joint_torque", "nm", n),
             joints("motor_speed", "rad_per_s", n),
-            *(scalar(f"drive_{name}", "j") for name in ("work", "loss", "stored", "given")),
+            *(scalar(f"drive_{name}", "j") for name in ("work", "loss", "stored", "given", "link_friction")),
         )
         drive, h = c.values(n), scene.model.opt.timestep
         drawn = copied(self._rng)

@@ -209,6 +209,11 @@ class Scenario(PartConfig):
         return self.trocar is not None and self.trocar.wall is not None
 
     @property
+    def has_force_sensor(self) -> bool:
+        """Whether there is a force-torque sensor at the flange."""
+        return any(item.measures_flange for item in self.disturbances)
+
+    @property
     def has_drives(self) -> bool:
         """Whether the arm's joints have motors behind elastic gears."""
         return self.robot.drives is not None

@@ -153,8 +153,12 @@ def _path_start(scenario: Scenario, arm: ArmModel) -> Array:
 
 
 def _start_key(scenario: Scenario) -> str:
-    """The scenario reduced to what start and reach depend on: not the seed, nor what disturbs the plant."""
-    return scenario.model_copy(update={"seed": 0, "disturbances": ()}).model_dump_json()
+    """The scenario reduced to what start and reach depend on: not the seed, nor what disturbs the plant.
+
+    A sensor stays: a controller may not go without it.
+    """
+    sensors = tuple(item for item in scenario.disturbances if item.measures_flange)
+    return scenario.model_copy(update={"seed": 0, "disturbances": sensors}).model_dump_json()
 
 
 @lru_cache(maxsize=256)

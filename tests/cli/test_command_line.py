@@ -7,7 +7,7 @@ import subprocess
 import sys
 
 import pytest
-from shipped_controllers import FEELS
+from shipped_controllers import NEEDS
 
 from surgsim.cli.list import KINDS
 from surgsim.cli.main import COMMANDS, main
@@ -280,7 +280,7 @@ def test_version(capsys):
 def test_every_shipped_controller_runs_the_circle(capsys, monkeypatch, tmp_path, name):
     monkeypatch.chdir(tmp_path)
     words = ["run", "circle_lwr4plus", "--controller", name, "--no-record", "--json"]
-    wall = ["trocar.wall={}"] if name in FEELS else []
+    wall = NEEDS.get(name, ())
     assert main([*words, *_set(*SHORT, *SLOW_LIMITS, *wall, "theatre=false", "task.radius_m=0.002")]) == 0
     summary = json.loads(capsys.readouterr().out)
     assert (summary["controller"], summary["outcome"]["name"]) == (name, "completed")

@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 import pytest
 from published_arms import GRAVITY_M_PER_S2, PUBLISHED, PublishedArm, slope
-from shipped_controllers import FEELS
+from shipped_controllers import NEEDS
 
 from surgsim.models.build import GRAVITY_M_PER_S2 as OURS
 from surgsim.models.build import Scene, build_arm
@@ -108,7 +108,7 @@ def test_mass_matrix_is_that_of_the_seven_links(arm, published, q):
 
 @pytest.mark.parametrize("controller", shipped("controllers"))
 def test_every_shipped_controller_moves_it_and_keeps_the_limits(name, controller):
-    wall = ("trocar.wall={}",) if controller in FEELS else ()
+    wall = NEEDS.get(controller, ())
     trace = simulate(load_scenario(f"circle_{name}", controller=controller, assignments=(*SHORT, *wall)))
     assert trace.meta.ending.outcome.name == "COMPLETED"
     assert trace["tip_error_m"].max() < TIP_MAX_M[name]

@@ -265,6 +265,10 @@ def test_a_link_is_held_that_its_friction_can_hold():
             plant.step(push, np.zeros(N))
         moved = plant.data.qpos[1] - before
         assert moved > 1e-3 if moves else abs(moved) < 1e-12
+        values = plant.hooks.values_of(2)
+        names = [column for block in part.columns for column in block.columns]
+        lost = values[names.index("drive_link_friction_j")]
+        assert lost == pytest.approx(3.0 * moved, rel=1e-3, abs=1e-12)
 
 
 def test_friction_that_is_greater_at_rest_belongs_to_the_motors():

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from shipped_controllers import FEELS
+from shipped_controllers import NEEDS
 
 from surgsim.control.rcm import rcm_kinematics
 from surgsim.control.resolvers import RESOLVERS
@@ -36,7 +36,7 @@ def made(joints, controller, *assignments):
 @arms
 @pytest.mark.parametrize("controller", sorted(shipped("controllers")))
 def test_every_shipped_controller_completes_or_is_refused(joints, controller):
-    wall = ["trocar.wall={}"] if controller in FEELS else []
+    wall = NEEDS.get(controller, ())
     scenario = made(joints, controller, *wall)
     if (joints, controller) == (6, "self_motion"):
         with pytest.raises(

@@ -8,12 +8,12 @@ from pydantic import Field, NonNegativeFloat, PositiveFloat
 
 from surgsim.catalog import PartConfig, Surroundings
 from surgsim.compiled import compiled
+from surgsim.control.admittance import give_way, heed
 from surgsim.control.filters import filter_gains
 from surgsim.control.observer import observe_positions, position_observer_size
 from surgsim.control.port_estimators.base import KernelPortEstimator
 from surgsim.control.port_force import lateral_force, split_wrench
 from surgsim.models.arm import ArmModel
-from surgsim.tick.algebra import norm
 from surgsim.tick.arrays import Seen
 from surgsim.tick.scratch import scratch
 from surgsim.tick.status import GOES_ON, RANK_LOST
@@ -56,9 +56,13 @@ class PortAdmittanceConfig(PartConfig):
     state_hz: PositiveFloat = 20.0
 
     def check(self, scenario: Surroundings) -> None:
-        """Refuse a scenario without a wall."""
+        """Refuse a scenario without a wall, or without the sensor that is to feel it."""
         if not scenario.has_wall:
             raise ValueError("controller.port 'admittance' feels no wall: give trocar.wall")
+        if self.force == "flange" and not scenario.has_force_sensor:
+            raise ValueError(
+                "controller.port 'admittance' needs the disturbance force_torque_sensor, or force: joints"
+            )
 
     def build(self, arm: ArmModel) -> KernelPortEstimator:
         """The estimator; memory tare (3,), offset (3,) and its rate (3,), ticks, the observer's."""
@@ -89,12 +93,10 @@ def port_admittance(gains: Array, seen: Seen, memory: Array, out: Array) -> int:
 
         M_a o'' + D_a o' + K_a o = dead(F - tare),   p_C = p_seen + o
 
-    dead(F) = F (1 - F_0/|F|), 0 below F_0. Where o would go farther than `most_m` it stops there.
+    dead(F) = F (1 - F_0/|F|), 0 below F_0 (`surgsim.control.admittance`).
 
     With a wall of stiffness K and a shaft that follows, o settles where the wall is relaxed, as a system of
-    second order with the natural frequency sqrt((K + K_a)/M_a). Semi-implicit Euler with implicit damping.
-
-    Without a sensor at the flange `force: flange` feels nothing.
+    second order with the natural frequency sqrt((K + K_a)/M_a).
 
     Source: the target admittance of Nasiri and Wang (arXiv 2404.04416, 2407.12711), which estimates the force
     at the port and lets the constraint give way to it inside the redundancy resolution; its equations and
@@ -102,9 +104,9 @@ def port_admittance(gains: Array, seen: Seen, memory: Array, out: Array) -> int:
     """
     dt = seen.dt_s
     tare, offset, rate = memory[:3], memory[3:6], memory[6:9]
-    force, other, push = scratch(3), scratch(3), scratch(3)
+    force, other = scratch(3), scratch(3)
     for i in range(3):
-        force[i] = push[i] = 0.0
+        force[i] = 0.0
     if gains[SENSOR] != 0.0:
         if seen.has_wrench:
             split_wrench(seen, gains[OTHER], force, other)
@@ -116,25 +118,8 @@ def port_admittance(gains: Array, seen: Seen, memory: Array, out: Array) -> int:
         if not lateral_force(seen, d, force):
             return RANK_LOST
     memory[9] += 1.0
-    if seen.t_s < gains[TARE_S]:
-        for i in range(3):
-            tare[i] += (force[i] - tare[i]) / memory[9]
-    else:
-        for i in range(3):
-            force[i] -= tare[i]
-        size = norm(force)
-        if size > gains[DEAD_ZONE]:
-            for i in range(3):
-                push[i] = force[i] * (1.0 - gains[DEAD_ZONE] / size)
-    for i in range(3):
-        moving = gains[MASS] * rate[i] + dt * (push[i] - gains[STIFFNESS] * offset[i])
-        rate[i] = moving / (gains[MASS] + dt * gains[DAMPING])
-        offset[i] += dt * rate[i]
-    size = norm(offset)
-    if size > gains[MOST]:
-        for i in range(3):
-            offset[i] *= gains[MOST] / size
-            rate[i] = 0.0
+    heed(force, tare, memory[9], seen.t_s < gains[TARE_S], gains[DEAD_ZONE])
+    give_way(force, gains[MASS], gains[DAMPING], gains[STIFFNESS], gains[MOST], dt, offset, rate)
     for i in range(3):
         out[0, i] = seen.p_WC[i] + offset[i]
         out[1, i] = seen.v_WC[i] + rate[i]

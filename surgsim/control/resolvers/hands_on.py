@@ -6,9 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, NonNegativeFloat, PositiveFloat
 
-from surgsim.catalog import PartConfig
+from surgsim.catalog import PartConfig, Surroundings
 from surgsim.columns import vector, width
 from surgsim.compiled import compiled
+from surgsim.control.admittance import give_way, heed
 from surgsim.control.inside import HEAD_SIZE, resolve_below
 from surgsim.control.joining import memory_size
 from surgsim.control.planes import PlaneConfig, plane_numbers
@@ -18,7 +19,7 @@ from surgsim.control.resolvers import RESOLVERS
 from surgsim.control.resolvers.base import KernelResolver
 from surgsim.control.resolvers.pinv import PinvConfig
 from surgsim.models.arm import ArmModel
-from surgsim.tick.algebra import dot, norm
+from surgsim.tick.algebra import dot
 from surgsim.tick.arrays import Resolved, Seen
 from surgsim.tick.scratch import scratch
 from surgsim.tick.status import GOES_ON
@@ -47,7 +48,7 @@ class HandsOnConfig(PartConfig):
         tare_s: The mean force over this first time is taken off; nobody may hold the instrument so long [s].
         most_m: Farthest that the tip may be led from its path [m].
         planes: Walls of the region that the tip is kept in.
-        barrier_n_m2: Strength of the walls' repulsion [N m^2].
+        barrier_n_m3: Strength k of the walls' repulsion [N m^3].
         barrier_range_m: How near to a wall it begins [m].
         resolver: Resolves the tip's motion and holds the RCM.
     """
@@ -62,7 +63,7 @@ class HandsOnConfig(PartConfig):
     tare_s: NonNegativeFloat = 0.2
     most_m: PositiveFloat = 0.1
     planes: tuple[PlaneConfig, ...] = ()
-    barrier_n_m2: NonNegativeFloat = 1e-6
+    barrier_n_m3: NonNegativeFloat = 1e-6
     barrier_range_m: PositiveFloat = 0.02
     resolver: AnyPlainResolver = PinvConfig()
 
@@ -70,6 +71,12 @@ class HandsOnConfig(PartConfig):
     def needs_redundancy(self) -> int:
         """As much as the resolver below."""
         return redundancy_needed(self.resolver)
+
+    def check(self, scenario: Surroundings) -> None:
+        """Refuse a scenario without the sensor that feels the hand."""
+        if not scenario.has_force_sensor:
+            raise ValueError("controller.resolver 'hands_on' needs the disturbance force_torque_sensor")
+        self.resolver.check(scenario)
 
     def build(self, arm: ArmModel) -> KernelResolver:
         """The resolver."""
@@ -82,7 +89,7 @@ class HandsOnConfig(PartConfig):
             self.least_depth_m,
             self.tare_s,
             self.most_m,
-            self.barrier_n_m2,
+            self.barrier_n_m3,
             self.barrier_range_m,
         )
         below: Any = self.resolver.build(arm)
@@ -106,12 +113,13 @@ def hands_on(gains: Array, seen: Seen, memory: Array, out: Resolved) -> int:
     F_h is the force of a hand on the shaft, l above the tip, told apart from that of the wall at the depth s
     by the moment (`surgsim.control.port_force.split_wrench`); along the shaft all of the force is taken for
     the hand's. F_T does the same work at the tip as F_h does at the hand, with the shaft turning about the
-    port: so the hand feels a passive body, whatever the lever is. V keeps the tip on the inner side of the
-    walls n p <= o: with the gap g = o - n p and its range g_0,
+    port: so the hand feels a passive body, whatever the lever is, while the tip is at least `least_depth_m` deep.
+    V keeps the led tip on the inner side of the walls n p <= o: with the gap g and its range g_0,
 
-        - grad V = - k (1/g - 1/g_0) / g^2 n     for g < g_0
+        - grad V = - k (1/g - 1/g_0) / g^2 n     for g < g_0,    g = max(o - n p_WTd, g_0) - n e
 
-    Semi-implicit Euler with implicit damping. Without a sensor at the flange nothing is felt.
+    and e goes no farther than to the wall. A path that itself comes nearer to a wall than g_0 moves the wall
+    along: walls hold back the hand, not the task.
 
     Source: the target admittance with RCM constraint and forbidden regions of Kastritsi and Doulgeri
     (arXiv 2202.10783), whose gains and variable damping were not seen; the RCM is held by the rows of the
@@ -122,34 +130,18 @@ def hands_on(gains: Array, seen: Seen, memory: Array, out: Resolved) -> int:
     hand, force = scratch(3), scratch(3)
     _felt(gains, seen, hand)
     memory[TICKS] += 1.0
-    if seen.t_s < gains[TARE_S]:
-        for i in range(3):
-            tare[i] += (hand[i] - tare[i]) / memory[TICKS]
-            hand[i] = 0.0
-    else:
-        for i in range(3):
-            hand[i] -= tare[i]
-        size = norm(hand)
-        for i in range(3):
-            hand[i] *= max(1.0 - gains[DEAD_ZONE] / size, 0.0) if size > 0.0 else 0.0
+    heed(hand, tare, memory[TICKS], seen.t_s < gains[TARE_S], gains[DEAD_ZONE])
     _at_tip(gains, seen, hand, force)
     _repel(gains, seen, away, force)
-    kept = scratch(9)
+    kept, before = scratch(9), scratch(3)
+    before[:] = rate
+    give_way(force, gains[MASS], gains[DAMPING], gains[STIFFNESS], gains[MOST], dt, away, rate)
+    _stop_at_walls(gains, seen, away, rate)
     for i in range(3):
         kept[i], kept[3 + i], kept[6 + i] = seen.p_WTd[i], seen.v_WTd[i], seen.a_WTd[i]
-        before = rate[i]
-        moving = gains[MASS] * before + dt * (force[i] - gains[STIFFNESS] * away[i])
-        rate[i] = moving / (gains[MASS] + dt * gains[DAMPING])
-        away[i] += dt * rate[i]
-        seen.a_WTd[i] += (rate[i] - before) / dt
-    size = norm(away)
-    for i in range(3):
-        if size > gains[MOST]:
-            away[i] *= gains[MOST] / size
-            rate[i] = 0.0
-            seen.a_WTd[i] = kept[6 + i]
         seen.p_WTd[i] += away[i]
         seen.v_WTd[i] += rate[i]
+        seen.a_WTd[i] += (rate[i] - before[i]) / dt
     status = resolve_below(gains, seen, memory[BELOW:], out)
     if status != GOES_ON:  # what is seen stays as the resolver below saw it, for who looks into it
         return status
@@ -197,14 +189,31 @@ def _at_tip(gains: Array, seen: Seen, hand: Array, force: Array) -> None:
 
 @compiled
 def _repel(gains: Array, seen: Seen, away: Array, force: Array) -> None:
-    """Add the repulsion of the walls on the commanded tip, of which a thousandth of the range is kept off."""
+    """Add the repulsion of the walls on the led tip; a twentieth of the range nearer it grows no more."""
     reach = gains[RANGE]
     for at in range(WALLS, gains.size, 4):
-        normal, place = gains[at : at + 3], scratch(3)
-        for i in range(3):
-            place[i] = seen.p_WTd[i] + away[i]
-        gap = max(gains[at + 3] - dot(normal, place), 1e-3 * reach)
+        normal = gains[at : at + 3]
+        gap = max(_room(gains, seen, at) - dot(normal, away), 0.05 * reach)
         if gap < reach:
             size = gains[BARRIER] * (1.0 / gap - 1.0 / reach) / (gap * gap)
             for i in range(3):
                 force[i] -= size * normal[i]
+
+
+@compiled
+def _room(gains: Array, seen: Seen, at: int) -> float:
+    """How far the tip may be led towards the wall whose numbers begin at `at` [m]."""
+    room: float = max(gains[at + 3] - dot(gains[at : at + 3], seen.p_WTd), gains[RANGE])
+    return room
+
+
+@compiled
+def _stop_at_walls(gains: Array, seen: Seen, away: Array, rate: Array) -> None:
+    """Lead the tip no farther than to a wall."""
+    for at in range(WALLS, gains.size, 4):
+        normal = gains[at : at + 3]
+        over, speed = dot(normal, away) - _room(gains, seen, at), dot(normal, rate)
+        if over > 0.0:
+            for i in range(3):
+                away[i] -= over * normal[i]
+                rate[i] -= max(speed, 0.0) * normal[i]

@@ -55,7 +55,7 @@ class RcmMpcConfig(ElasticObserverConfig):
     """
 
     type: Literal["rcm_mpc"] = "rcm_mpc"
-    horizon_s: Annotated[float, Field(ge=0.005, le=0.5)] | None = None
+    horizon_s: Annotated[float, Field(ge=0.005, le=0.1)] | None = None
     blocks: Annotated[int, Field(ge=1, le=5)] = 3
     velocity_share: PositiveFloat = 0.4
     rcm_weight: PositiveFloat = 100.0
@@ -90,8 +90,8 @@ class RcmMpcConfig(ElasticObserverConfig):
 
 
 def rows_of(n: int, blocks: int) -> int:
-    """Variables and rows of the program of n joints: accelerations; then torques, velocities, positions."""
-    return 4 * n * blocks
+    """Variables and rows of the program of n joints: accelerations; then torques and velocities."""
+    return 3 * n * blocks
 
 
 @compiled
@@ -112,14 +112,14 @@ def rcm_mpc(gains: Array, seen: Seen, memory: Array, out: Array) -> int:
     trocar and the command carried on with their velocities and accelerations. c_1 = h^2/2. Subject to, at
     every block,
 
-        |(M + B_s) u_k + c - d| <= tau_max,   |u - u_last| <= rate T             (the first alone)
-        |q'(t_k)| <= the speed from which a joint can stop before its range ends
-        q_min <= q(t_k) <= q_max
+        |(M + B_s) u_k + c + D_l v - d + f| <= tau_max,   |u - u_last| <= rate T        (the first alone)
+        |q'(t_k)| <= the speed from which a joint can stop before its range ends, from where it is now
 
-    A joint that is past a bound already has to brake, or come back, by the end of the first block. Where the
-    rate excludes that, it gives way in the program, and the interface cuts the command; where the other rows
-    exclude each other, the run ends as INFEASIBLE. The program is solved exactly at every tick, and starts
-    from the active rows of the last one.
+    That speed is at most ten times the room a second: within a horizon of 0.1 s no joint leaves its range. A
+    joint that is too fast already has to brake by the end of the first block. Where the rate excludes that,
+    it gives way in the program, and the interface cuts the command; where the other rows exclude each other,
+    the run ends as INFEASIBLE. The program is solved exactly at every tick, and starts from the active rows
+    of the last one.
 
     Without active limits and for w_q -> 0 all errors obey e'' = -k e - d e', with k and d from N, H and T_v
     alone: for N = 3 and T_v = 0.4 H a natural frequency of 2.3/H and a damping ratio of 0.85.
@@ -131,7 +131,7 @@ def rcm_mpc(gains: Array, seen: Seen, memory: Array, out: Array) -> int:
     """
     n, numbers = seen.q.size, gains[OBSERVER:]
     blocks = int(gains[BLOCKS])
-    size = memory.size - 4 * n * blocks
+    size = memory.size - 3 * n * blocks
     d = scratch(n)
     status = look_ahead(numbers, seen, memory[:size], d)
     if status != GOES_ON:
@@ -159,7 +159,7 @@ def plan(gains: Array, seen: Seen, model: Model, d: Array, last: Array, remember
         model: The arm at the state that the horizon begins with.
         d: Disturbance torque (n,) [N m].
         last: Torque of the last tick (n,) [N m].
-        remembered: Sides of the last solution (4 N n,), changed.
+        remembered: Sides of the last solution (3 N n,), changed.
         u: Filled [rad/s^2].
     """
     H, f, lower, upper, G, low, high = program(gains, seen, model, d)
@@ -223,7 +223,7 @@ def program(
         for o in range(i):
             H[o, i] = H[i, o]
     lower, upper = np.full(size, -math.inf), np.full(size, math.inf)
-    G, low, high = np.zeros((3 * size, size)), np.empty(3 * size), np.empty(3 * size)
+    G, low, high = np.zeros((2 * size, size)), np.empty(2 * size), np.empty(2 * size)
     _fill_limits(seen, model, d, h, G, low, high)
     return H, f, lower, upper, G, low, high
 
@@ -252,22 +252,18 @@ def _quadratic(gains: Array, seen: Seen, model: Model, A: Array, P: Array) -> No
 
 @compiled
 def _fill_limits(seen: Seen, model: Model, d: Array, h: float, G: Array, low: Array, high: Array) -> None:
-    """Rows of torques, velocities and positions: N n of each, block by block."""
+    """Rows of torques and velocities: N n of each, block by block."""
     n, size = seen.q.size, G.shape[1]
     for k in range(size // n):
-        t, at = (k + 1) * h, k * n
+        at = k * n
         for i in range(n):
             constant = model.bias[i] + seen.damping[i] * model.v[i] - d[i]
             most = TORQUE_SHARE * seen.tau_max[i]
             low[at + i], high[at + i] = -most - constant, most - constant
             for j in range(n):
                 G[at + i, at + j] = model.M[i, j]
-            fast, place = size + at + i, 2 * size + at + i
+            fast = size + at + i
             for j in range(k + 1):
                 G[fast, j * n + i] = h
-                G[place, j * n + i] = h * h * (k - j + 0.5)
             high[fast] = top_speed(seen, i, seen.q_max[i] - model.q[i]) - model.v[i]
             low[fast] = -top_speed(seen, i, model.q[i] - seen.q_min[i]) - model.v[i]
-            free = model.q[i] + t * model.v[i]
-            high[place] = max(seen.q_max[i], model.q[i]) - free
-            low[place] = min(seen.q_min[i], model.q[i]) - free

@@ -3,7 +3,7 @@
 import copy
 import math
 from abc import ABC, abstractmethod
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -102,7 +102,13 @@ def check_rate(name: str, key: str, rate_hz: float, control_period_s: float) -> 
 
 
 class DisturbanceConfig(PartConfig, ABC):
-    """Base of a disturbance's config."""
+    """Base of a disturbance's config.
+
+    Attributes:
+        measures_flange: Whether it is a force-torque sensor at the flange.
+    """
+
+    measures_flange: ClassVar[bool] = False
 
     @abstractmethod
     def build(self, rng: np.random.Generator) -> PlantPart:

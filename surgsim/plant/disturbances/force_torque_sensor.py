@@ -1,7 +1,7 @@
 """A force-torque sensor between flange and instrument."""
 
 from collections.abc import Mapping
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 import mujoco
 import numpy as np
@@ -26,8 +26,8 @@ FORCE_STD, MOMENT_STD, BODY, ROOT = range(4)
 """Gains: standard deviations [N] and [N m], bodies of the instrument and of the arm's root; then the bias."""
 BIAS, WEIGHT, CENTRE, TIP = (slice(4 + 6 * k, 10 + 6 * k) for k in range(4))
 """Bias (6,) [N, N m], weight (3,) [N]; centre of mass and tip (3,) [m] in the frame of the shaft's entry."""
-TRUE, NOISE = slice(0, 6), 6
-"""Memory: force and moment (6,) of the last step; then the noise's rows (6,)."""
+OWN, WHOLE, NOISE = slice(0, 6), slice(6, 12), 12
+"""Memory: force and moment (6,) of the last step, and with those of the wall; then the noise's rows (6,)."""
 
 
 @compiled
@@ -62,17 +62,17 @@ def feel(gains: Array, world: World, memory: Array, out: Array) -> int:
         centre[i] -= tip[i]
     cross(arm, held[3:], from_flange)
     cross(centre, weight[:3], from_weight)
-    true = memory[TRUE]
+    own = memory[OWN]
     for i in range(3):
-        true[i] = -held[3 + i] - weight[i]
-        true[3 + i] = -held[i] - from_flange[i] - from_weight[i]
+        own[i] = -held[3 + i] - weight[i]
+        own[3 + i] = -held[i] - from_flange[i] - from_weight[i]
     return GOES_ON
 
 
 @compiled
 def report(gains: Array, world: World, memory: Array, out: Array) -> int:
     """What is measured, f_S = F + b_f + s_f n and m_S = M + b_m + s_m n, with independent normal n."""
-    true, bias, noise = memory[TRUE], gains[BIAS], NOISE + 6 * drawn_row(world.tick)
+    true, bias, noise = memory[WHOLE], gains[BIAS], NOISE + 6 * drawn_row(world.tick)
     world.has_wrench = 1
     for i in range(3):
         world.f_S_m[i] = true[i] + bias[i] + gains[FORCE_STD] * memory[noise + i]
@@ -84,11 +84,12 @@ def report(gains: Array, world: World, memory: Array, out: Array) -> int:
 def tell(gains: Array, world: World, memory: Array, out: Array) -> int:
     """The columns: the true force and moment, with those of the wall added.
 
-        F := F - f_C,   M := M - (p_WC - p_T) x f_C
+        F - f_C,   M - (p_WC - p_T) x f_C
 
     f_C is the force of the shaft on the wall, which MuJoCo knows as joint torques only.
     """
-    true = memory[TRUE]
+    true = memory[WHOLE]
+    true[:] = memory[OWN]
     if world.walled:
         arm, moment = scratch(3), scratch(3)
         _placed(world, gains[TIP], arm)
@@ -116,6 +117,8 @@ class ForceTorqueSensorConfig(DisturbanceConfig):
         force_bias_std_n: Standard deviation of each component of a constant bias, drawn by the seed [N].
         moment_bias_std_nm: The same of the moment [N m].
     """
+
+    measures_flange: ClassVar[bool] = True
 
     type: Literal["force_torque_sensor"] = "force_torque_sensor"
     force_std_n: NonNegativeFloat = 0.05

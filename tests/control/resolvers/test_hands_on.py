@@ -72,15 +72,30 @@ def test_the_tip_moves_as_the_mass_that_it_says(arm, problem, mass, damping, sti
     np.testing.assert_allclose(felt[-1], 2.0 * np.sin(4.0 * (t[-1] - DT)) * direction, atol=1e-9)
 
 
-def test_the_hand_does_the_work_that_the_tip_takes(problem):
-    """The shaft turns about the port, so that the hand's own velocity follows from the tip's."""
-    z, depth = problem.kin.R_WT[:, 2], problem.rcm.depth
-    rng = np.random.default_rng(0)
+def test_the_hand_does_the_work_that_the_tip_takes(arm, problem):
+    """The shaft slides through the port and turns about it, as a rigid body: F_h v_h = F_T v_T.
+
+    F_T is taken from the kernel: what a kilogram gains in one period.
+    """
+    z, port, tip = problem.kin.R_WT[:, 2], problem.p_WC, problem.kin.p_WT
+    place, rng = tip - HAND * z, np.random.default_rng(0)
     for _ in range(20):
-        hand, tip_velocity = rng.normal(size=3), rng.normal(size=3)
-        axial = (tip_velocity @ z) * z
-        hand_velocity = axial - (HAND - depth) / depth * (tip_velocity - axial)
-        assert hand @ hand_velocity == pytest.approx(_equivalent(problem, hand) @ tip_velocity)
+        hand, turn, slide = rng.normal(size=3), rng.normal(size=3), rng.normal()
+        _, rates, _ = _led(arm, problem, lambda t, F=hand: F, DT, mass_kg=1.0, damping_n_s_per_m=1e-9)
+        at_tip = rates[0] / DT
+        v_tip = np.cross(turn, tip - port) + slide * z
+        v_hand = np.cross(turn, place - port) + slide * z
+        assert hand @ v_hand == pytest.approx(at_tip @ v_tip, rel=1e-6, abs=1e-9)
+
+
+def test_a_wall_that_the_path_itself_passes_throws_nothing(arm, problem):
+    """Walls hold back the hand, and move along with a path that comes too near."""
+    for beyond in (-0.05, 0.0, 0.005):
+        offset = float(problem.command.p_WTd[0]) + beyond
+        wall = {"normal": (1.0, 0.0, 0.0), "offset_m": offset}
+        away, rates, _ = _led(arm, problem, lambda t: np.zeros(3), 0.1, planes=(wall,))
+        assert not away.any()
+        assert not rates.any()
 
 
 def test_no_energy_comes_back_that_was_not_given(arm, problem):
@@ -98,7 +113,7 @@ def test_a_wall_is_not_passed(arm, problem):
     place = float(normal @ problem.command.p_WTd) + 0.02
     wall = {"normal": tuple(normal.tolist()), "offset_m": place}
     away, _, _ = _led(
-        arm, problem, lambda t: 30.0 * normal, 2.0, planes=(wall,), barrier_n_m2=1e-5, damping_n_s_per_m=60.0
+        arm, problem, lambda t: 30.0 * normal, 2.0, planes=(wall,), barrier_n_m3=1e-5, damping_n_s_per_m=60.0
     )
     reached = away @ normal
     assert 0.005 < reached.max() < 0.02

@@ -10,7 +10,7 @@ import surgsim
 from surgsim.contract.problems import torque_problem
 from surgsim.control.torque_laws.base import seen_of_torque
 from surgsim.control.torque_laws.rcm_hierarchy import fill_task_errors
-from surgsim.control.torque_laws.rcm_mpc import OBSERVER, RcmMpcConfig, plan, program
+from surgsim.control.torque_laws.rcm_mpc import RcmMpcConfig, plan, program
 from surgsim.errors import Outcome
 from surgsim.models.arm import ArmModel
 from surgsim.models.config import RobotConfig, SceneConfig
@@ -44,7 +44,7 @@ def _planned(config, arm, seen, d, last):
     law = config.build(arm)
     n = seen.q.size
     u = np.zeros(config.blocks * n)
-    status = plan(law.gains, seen, seen.elsewhere, d, last, np.zeros(4 * u.size), u)
+    status = plan(law.gains, seen, seen.elsewhere, d, last, np.zeros(3 * u.size), u)
     return status, u.reshape(config.blocks, n)
 
 
@@ -115,10 +115,12 @@ def _with_states(config, seen, d, tau_max, rate_step, last, v_top):
 
 
 @pytest.mark.parametrize("seed", range(6))
-@pytest.mark.parametrize("bounded", [False, True])
-def test_its_program_is_that_with_states(arm, seed, bounded):
+@pytest.mark.parametrize("limited", ["nothing", "torque and speed", "rate"])
+def test_its_program_is_that_with_states(arm, seed, limited):
     """Condensed by us, uncondensed in the test: the same accelerations, with and without active limits."""
     config = RcmMpcConfig(horizon_s=0.03, joint_weight=0.05, delay_ticks=0)
+    if limited == "rate":
+        arm = ArmModel(SceneConfig(robot=RobotConfig(name="panda", drive="real")))
     seen = _seen(arm, seed)
     seen.q[:] = np.clip(seen.q, seen.q_min + 0.4, seen.q_max - 0.4)
     seen.v[:] *= 0.1
@@ -131,26 +133,44 @@ def test_its_program_is_that_with_states(arm, seed, bounded):
     seen.v_WC[:], seen.a_WC[:] = 0.0, 0.0
     d = np.linspace(-1.0, 1.0, seen.q.size)
     last = seen.elsewhere.bias - d
-    if not bounded:
-        seen.tau_max[:], seen.v_max[:] = FREE, FREE
-    else:
-        seen.tau_max[:] = np.abs(last) + 4.0
-        seen.v_max[:] = 0.15
-    gains = config.build(arm).gains
-    rate = gains[OBSERVER + 7]
-    assert rate == np.inf  # ideal drives take any rate
+    seen.tau_max[:], seen.v_max[:] = FREE, FREE
+    if limited == "torque and speed":
+        seen.tau_max[:], seen.v_max[:] = np.abs(last) + 4.0, 0.15
     status, u = _planned(config, arm, seen, d, last)
     assert status == 0
+    step = arm.drive.torque_rate * seen.dt_s if limited == "rate" else FREE
     v_top = np.full(seen.q.size, 0.97) * seen.v_max
-    theirs = _with_states(config, seen, d, 0.999 * seen.tau_max, FREE, last, v_top)
+    theirs = _with_states(config, seen, d, 0.999 * seen.tau_max, step, last, v_top)
     assert u == pytest.approx(theirs, rel=1e-4, abs=1e-3 * np.abs(theirs).max())
-    if bounded:
-        torque = u @ seen.elsewhere.M.T + seen.elsewhere.bias + seen.damping * seen.v - d
-        fast = seen.v + np.cumsum(u, axis=0) * 0.01
-        assert (np.abs(torque) <= 0.999 * seen.tau_max * (1 + 1e-7)).all()
-        assert (np.abs(fast) <= v_top * (1 + 1e-7)).all()
-        near = np.isclose(np.abs(torque), 0.999 * seen.tau_max, rtol=1e-6).any()
-        assert near or np.isclose(np.abs(fast), v_top, rtol=1e-6).any()
+    torque = u @ seen.elsewhere.M.T + seen.elsewhere.bias + seen.damping * seen.v - d
+    fast = seen.v + np.cumsum(u, axis=0) * 0.01
+    assert (np.abs(torque) <= 0.999 * seen.tau_max * (1 + 1e-7)).all()
+    assert (np.abs(fast) <= v_top * (1 + 1e-7)).all()
+    change = np.abs(torque[0] - last)
+    assert (change <= step * (1 + 1e-7)).all()
+    if limited == "torque and speed":
+        assert np.isclose(np.abs(torque), 0.999 * seen.tau_max, rtol=1e-6).any()
+        assert np.isclose(np.abs(fast), v_top, rtol=1e-6).any()
+    if limited == "rate":
+        assert np.isclose(change, step, rtol=1e-6).any()
+
+
+def test_no_joint_leaves_its_range_within_the_horizon(arm):
+    """Joints near their ends, at speed and asked to go on: the rows of speed keep them inside."""
+    config = RcmMpcConfig(horizon_s=0.1, delay_ticks=0)
+    for seed in range(4):
+        seen = _seen(arm, seed)
+        seen.q[:] = seen.q_max - np.linspace(0.002, 0.05, seen.q.size)
+        seen.v[:] = 0.5 * (seen.q_max - seen.q) * 10.0
+        kinematics(seen.elsewhere, seen.q)
+        dynamics(seen.elsewhere, seen.v)
+        seen.q_ref[:], seen.tau_max[:] = seen.q_max + 1.0, FREE
+        status, u = _planned(config, arm, seen, np.zeros(seen.q.size), seen.elsewhere.bias)
+        assert status == 0
+        q, v, h = seen.q.copy(), seen.v.copy(), 0.1 / 3
+        for block in u:
+            q, v = q + h * v + 0.5 * h * h * block, v + h * block
+            assert (q <= seen.q_max).all()
 
 
 @pytest.mark.parametrize("blocks", [1, 2, 3, 5])
@@ -183,7 +203,7 @@ def test_the_horizon_follows_the_drives(arm):
         horizon = RcmMpcConfig().build(real).gains[1]
         assert horizon == pytest.approx(2.3 / min(0.4 * real.locked_frequency, 85.0))
         assert 0.02 <= horizon <= 0.05
-    assert RcmMpcConfig(horizon_s=0.1).build(arm).gains[1] == 0.1
+    assert RcmMpcConfig(horizon_s=0.08).build(arm).gains[1] == 0.08
 
 
 def test_where_no_torque_is_enough_it_says_so(arm):

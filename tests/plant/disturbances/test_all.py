@@ -64,7 +64,9 @@ def _list(*names):
 def test_a_run_repeats_under_a_seed_and_differs_under_another_where_something_is_drawn(scenario, name):
     controller = "joint_impedance"  # stiff, and survives a delay
     first, again, other, calm = (
-        simulate(scenario(*SHORT, *changes, *_uses(name), controller=controller, seed=seed))
+        simulate(
+            scenario(*SHORT, *changes, *(_uses(name) if changes else ()), controller=controller, seed=seed)
+        )
         for seed, changes in ((1, [_list(name)]), (1, [_list(name)]), (2, [_list(name)]), (1, []))
     )
     assert first.equals(again)

@@ -105,7 +105,7 @@ def test_noise_and_bias_are_as_said(scenario):
         simulation, plant, off = Simulation(setup), setup.plant, []
         for _ in range(1500):
             wrench = plant.state().wrench
-            off.append(np.concatenate((wrench.force, wrench.moment)) - plant.parts[0].memory[:6])
+            off.append(np.concatenate((wrench.force, wrench.moment)) - plant.hooks.memory_of(2)[6:12])
             simulation.tick()
         off = np.array(off)
         biases.append(off.mean(axis=0))
