@@ -46,9 +46,9 @@ class Post(Record):
         plan: Address of `layout.runs`, three words each.
         runs: How many there are.
         q_word: Where `Seen.q` is in what is seen, in words.
-        files: Address of the numbers of a process's files: the `pollfd` of the one that it writes to, the one
-            that it reads from, the one that it writes to, and the `pollfd` of the one that it reads from. They
-            are -1 once it is ended.
+        files: Address of the numbers of a process's files: the `pollfd` of the one that it writes to, the
+            one that it reads from, the one that it writes to, and the `pollfd` of the one that it reads
+            from. They are -1 once it is ended.
         report: Address of two words: the reason, and one that says more.
     """
 

@@ -113,8 +113,8 @@ def hands_on(gains: Array, seen: Seen, memory: Array, out: Resolved) -> int:
     F_h is the force of a hand on the shaft, l above the tip, told apart from that of the wall at the depth s
     by the moment (`surgsim.control.port_force.split_wrench`); along the shaft all of the force is taken for
     the hand's. F_T does the same work at the tip as F_h does at the hand, with the shaft turning about the
-    port: so the hand feels a passive body, whatever the lever is, while the tip is at least `least_depth_m` deep.
-    V keeps the led tip on the inner side of the walls n p <= o: with the gap g and its range g_0,
+    port: so the hand feels a passive body, whatever the lever is, while the tip is at least `least_depth_m`
+    deep. V keeps the led tip on the inner side of the walls n p <= o: with the gap g and its range g_0,
 
         - grad V = - k (1/g - 1/g_0) / g^2 n     for g < g_0,    g = max(o - n p_WTd, g_0) - n e
 
