@@ -74,7 +74,16 @@ def test_the_picture_of_the_paths_is_that_of_the_current_paths(made):
 
 @pytest.mark.parametrize(
     "suite",
-    ["nominal", "theatre", "theatre_ideal", "seeds", "rings", "breathing_tracked", "breathing_hidden"],
+    [
+        "nominal",
+        "theatre",
+        "theatre_ideal",
+        "baselines",
+        "seeds",
+        "rings",
+        "breathing_tracked",
+        "breathing_hidden",
+    ],
 )
 def test_the_pages_of_the_leaderboard_say_what_their_rows_say(suite):
     from surgsim.compare.leaderboard import leaderboard
