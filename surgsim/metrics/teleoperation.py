@@ -21,6 +21,7 @@ FREE_SLACK_M_PER_S = 1e-4
 FREE_FORCE_N = 0.1
 _CONSTRAINTS = ("passivity_active", "planes_active", "qp_relaxed")
 _ALONE = ("ring_state", "trocar_force")
+_PRESSING = {"tissue", "contact_wall"}
 _PUSHING = {"push", "guiding_hand"}
 
 
@@ -82,18 +83,21 @@ def energy_residual(trace: Trace) -> Array:
     if np.isfinite(trace["tank_account_residual_j"]).all():
         total += np.abs(trace["tank_account_residual_j"])
     touch = _work_of_touch(trace)
-    if touch is not None:  # one row late: of the instant at which the last step began
-        total[:-1] += np.abs(trace["environment_work_j"][:-1] + touch[1:])
+    if touch is not None:  # late: of the instant at which the last physics step began
+        late = trace.meta.scenario["simulation"]["timestep_s"] / trace.meta.control_period_s
+        total[:-1] += np.abs(trace["environment_work_j"][:-1] + touch[:-1] + late * np.diff(touch))
     return total
 
 
 def _work_of_touch(trace: Trace) -> Array | None:
     """Work of what the tip touches on the arm, by the plant's ledger (rows,) [J]; None if more is in it."""
-    acting = {disturbance["type"] for disturbance in trace.meta.scenario.get("disturbances", ())}
-    if any(name in trace for name in _ALONE) or ("tissue" in acting and acting & _PUSHING):
+    scenario = trace.meta.scenario
+    acting = {part["type"] for key in ("disturbances", "props") for part in scenario.get(key, ())}
+    pressing = acting & _PRESSING
+    if any(name in trace for name in _ALONE) or (pressing and acting & _PUSHING):
         return None
     touch = trace["energy_contact_work_j"]
-    return touch + trace["energy_applied_work_j"] if "tissue" in acting else touch
+    return touch + trace["energy_applied_work_j"] if pressing else touch
 
 
 def energy_exchanged(trace: Trace) -> float:

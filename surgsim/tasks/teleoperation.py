@@ -183,11 +183,15 @@ class Teleoperation:
         """Let `hand` take the simulated operator's place, from the next `reset` on."""
         self._hand = hand
 
+    def force_acted_over(self, time_s: float) -> None:
+        """The measured force is of the last `time_s` of each control period [s], of all of it until told."""
+        laid_over(Law, self.gains).force_share = time_s / self._period
+
     def _describe(self, lives: Sequence[int]) -> None:
         """Fill the numbers; those of the mapping and of the hand come with `reset`."""
         c, law, at = self._c, laid_over(Law, self.gains), self._places
         near, far = law.operator, law.remote
-        law.hold_end_s, law.start[:] = c.hold_end_s, self._start
+        law.hold_end_s, law.start[:], law.force_share = c.hold_end_s, self._start, 1.0
         for side in (near, far):
             take(side, c)
             side.passivity, side.period_s = MODES[c.passivity], self._period
