@@ -74,7 +74,7 @@ class TeleoperationConfig(PartConfig):
         channel_back: The channel back; null: as `channel`.
         receiver: How long a set point is believed, on both sides.
         tanks: The energy tank of each side.
-        passivity_control: Limits of the passivity controller, on both sides.
+        passivity_control: The passivity controller of each side.
     """
 
     type: Literal["teleoperation"] = "teleoperation"
@@ -198,6 +198,7 @@ class Teleoperation:
             take(side.receiver, c.receiver)
             take(side.tank, c.tanks)
             take(side.control, c.passivity_control)
+            side.control.coordinates = c.passivity_control.port_force == "coordinating"
         near.start_tip[:] = self._start
         self._console.describe(near.console)
         self._noise_m = describe_operator(near.operator, c.operator, self._period)
@@ -229,7 +230,7 @@ class Teleoperation:
         for side_law, side in ((law.operator, near), (law.remote, far)):
             fill_tank(side_law.tank, side.tank)
             expect(side_law.receiver, side.receiver, memory)
-        state.work.p[:] = self._start
+        state.work.p[:] = far.reference[:] = self._start
         state.forth.drawn = state.back.drawn = near.operator.shaken = near.operator.scattered = DRAWN
         self._random = [np.random.default_rng(_child(self._seed, *key)) for key in _STREAMS]
         self.refill(1)
@@ -284,6 +285,7 @@ class Teleoperation:
         """Step both sides to `t_s` [s]; without feedback the tip is taken to be at its start, untouched."""
         told, kernel = new_feedback(), as_parameter(teleoperate, task_signature())
         told.t_s, told.p_WT[:] = t_s, self._start if feedback is None else feedback.p_WT
+        told.v_WT[:] = 0.0 if feedback is None else feedback.v_WT
         told.f_T[:] = 0.0 if feedback is None else feedback.f_T
         self.refill(1)
         if self._hand is None:

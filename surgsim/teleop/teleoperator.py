@@ -167,7 +167,9 @@ def teleoperate(gains: Array, feedback: Feedback, memory: Array, out: Command) -
     p, force = state.content[POSITION : POSITION + 3], state.content[FORCE : FORCE + 3]
     for i in range(3):
         p[i], force[i] = feedback.p_WT[i], -feedback.f_T[i]
-    energy = step_remote_side(law.remote, remote, law.forth, state.forth, memory, t_s, p, force, work)
+    energy = step_remote_side(
+        law.remote, remote, law.forth, state.forth, memory, t_s, p, feedback.v_WT, force, work
+    )
     send(law.back, state.back, memory, t_s, state.content, energy)
     if operator.hand.done and not state.is_done:
         state.is_done, state.done_s = 1, t_s

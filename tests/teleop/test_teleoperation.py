@@ -70,6 +70,37 @@ def test_without_tanks_a_light_grip_lets_the_delayed_spring_feed_energy_out(tele
     tanks_hold(runs["tank"])
 
 
+@pytest.mark.parametrize("grip", [(135.0, 6.45), (20.0, 1.0)], ids=["normal", "light"])
+def test_the_passivity_controller_rests_on_a_wall_and_gives_no_energy(grip):
+    """On the whole arm; it was said to chatter, on a wall that made energy."""
+    stiffness, damping = (
+        f"task.operator.{key}={value}"
+        for key, value in zip(("stiffness_n_per_m", "damping_ns_per_m"), grip, strict=True)
+    )
+    goals = "[{position_m: [0.0, 0.65, -0.075], push: true, dwell_s: 2.0}, {position_m: [0.0, 0.65, -0.04]}]"
+    assignments = (f"task.goals={goals}", "task.passivity=tdpa", stiffness, damping)
+    run = Simulation(prepare(load_scenario("teleop_wall_panda", assignments=assignments))).run()
+    force = run["tip_force_z_n"][run["goal"] == 0][-700:]
+    assert force.min() > 1.0
+    assert np.abs(np.diff(force)).max() < 0.2  # no chatter: what it holds bleeds off slowly
+    assert run["delivered_j"].max() < 1e-3
+    assert run["observer_remote_j"].min() > -1e-3
+    assert run["operator_done"][-1]
+    assert np.linalg.norm(run.block("tip")[-1] - run.block("tip_ref")[-1]) < 1e-3
+
+
+def test_drift_that_the_passivity_controller_leaves_is_compensated(teleoperate, goal, point_mass):
+    left = {}
+    for gain in (0.0, 2.0):
+        goals = (goal(0.04, 0.0, 0.0, **PUSH), goal(0.0, 0.0, 0.0, timeout_s=2.0, dwell_s=5.0))
+        keys = {"passivity": "tdpa", "drift_gain_per_s": gain, "hold_end_s": 2.0}
+        run = teleoperate(goals, mass=point_mass(wall_m=0.02), **keys)
+        master = 0.5 * (run["handle_x_m"] - run["handle_x_m"][0])
+        left[gain] = abs(run["x_m"][-1] - master[-1])
+    assert left[0.0] > 5e-3
+    assert left[2.0] < 0.2 * left[0.0]
+
+
 @pytest.mark.parametrize("stiffness", [200.0, 1000.0])
 def test_the_tank_holds_at_any_gain(teleoperate, goal, point_mass, stiffness):
     run = teleoperate(
