@@ -117,6 +117,20 @@ def _tank_min(trace: Trace) -> float:
     return float(min(trace["tank_operator_j"].min(), trace["tank_remote_j"].min()))
 
 
+def tank_deficit(trace: Trace) -> float:
+    """What was taken from empty tanks, both together [J]; NaN without tanks."""
+    if not np.isfinite(trace["tank_account_residual_j"]).all():
+        return math.nan
+    return float(trace["tank_operator_deficit_j"][-1] + trace["tank_remote_deficit_j"][-1])
+
+
+def acceleration_ratio(trace: Trace) -> float:
+    """Largest change of a joint's commanded velocity from tick to tick, over its acceleration limit."""
+    steps = np.abs(np.diff(trace.block("qdot_ref"), axis=0)) / trace.meta.control_period_s
+    ratio: Array = steps / np.array(trace.meta.limits["acceleration"])
+    return float(np.nanmax(ratio)) if np.isfinite(ratio).any() else math.nan
+
+
 def plane_overshoot(trace: Trace) -> float:
     """How far the tip got past a virtual wall of the resolver [m], 0 if never; NaN without walls."""
     resolver = trace.meta.scenario["controller"]["resolver"]
@@ -164,6 +178,22 @@ METRICS = (
         meaning="lowest level of the two energy tanks",
         compute=_teleoperated(_tank_min),
         lower_is_better=False,
+    ),
+    Metric(
+        name="tank_deficit_j",
+        heading="energy taken from empty tanks [J]",
+        matters=1e-3,
+        matters_source=CHOICE,
+        meaning="energy that was taken from the tanks though they were empty",
+        compute=_teleoperated(tank_deficit),
+    ),
+    Metric(
+        name="acceleration_limit_ratio",
+        heading="change of the commanded joint velocity, over the limit",
+        matters=0.01,
+        matters_source=CHOICE,
+        meaning="largest change of a joint's commanded velocity in a tick, over its acceleration limit",
+        compute=_of("qdot_ref", acceleration_ratio),
     ),
     Metric(
         name="delivered_max_j",
