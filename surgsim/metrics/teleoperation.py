@@ -13,6 +13,14 @@ from numpy.typing import NDArray
 from surgsim.metrics.accuracy import rms
 from surgsim.metrics.force import largest
 from surgsim.metrics.metric import CHOICE, FORCE_RESOLUTION, REPEATABILITY, Metric, with_block
+from surgsim.teleop.judgement import (
+    drift,
+    end_speed,
+    excess_j,
+    force_fidelity,
+    toggles_per_s,
+    transmitted_impedance,
+)
 from surgsim.trace.trace import Trace
 
 Array = NDArray[np.float64]
@@ -131,6 +139,16 @@ def acceleration_ratio(trace: Trace) -> float:
     return float(np.nanmax(ratio)) if np.isfinite(ratio).any() else math.nan
 
 
+def _delay_back(trace: Trace) -> float:
+    """Delay of the channel back [s]."""
+    task = trace.meta.scenario["task"]
+    return float((task.get("channel_back") or task["channel"])["delay_s"])
+
+
+def _impedance(trace: Trace) -> tuple[float, float]:
+    return transmitted_impedance(trace, _delay_back(trace))
+
+
 def plane_overshoot(trace: Trace) -> float:
     """How far the tip got past a virtual wall of the resolver [m], 0 if never; NaN without walls."""
     resolver = trace.meta.scenario["controller"]["resolver"]
@@ -200,8 +218,67 @@ METRICS = (
         heading="energy delivered, largest [J]",
         matters=1e-3,
         matters_source=CHOICE,
-        meaning="largest net energy that hand and surroundings got; above 0 is active behaviour",
+        meaning="largest net energy that hand and surroundings got; what the tanks held is theirs to give",
         compute=_teleoperated(lambda trace: float(np.max(trace["delivered_j"]))),
+    ),
+    Metric(
+        name="delivered_excess_j",
+        heading="energy delivered beyond the stored [J]",
+        matters=1e-3,
+        matters_source=CHOICE,
+        meaning="energy delivered, less what the tanks held at first; above 0 is active",
+        compute=_teleoperated(excess_j),
+    ),
+    Metric(
+        name="contact_toggles_max_per_s",
+        heading="contact begun or ended, most in a second [1/s]",
+        matters=2.0,
+        matters_source=CHOICE,
+        meaning="most beginnings and ends of contact at the tip within a second",
+        compute=_of("tip_force", toggles_per_s),
+    ),
+    Metric(
+        name="end_speed_mm_per_s",
+        heading="speed at the end, largest [mm/s]",
+        matters=1.0,
+        matters_source=CHOICE,
+        meaning="largest speed of handle or tip in the last half second",
+        compute=_teleoperated(lambda trace: 1e3 * end_speed(trace)),
+    ),
+    Metric(
+        name="drift_end_mm",
+        heading="tip from where the master points, at the end [mm]",
+        matters=0.1,
+        matters_source=REPEATABILITY,
+        meaning="distance of the tip from where the master points, at the end",
+        compute=_teleoperated(lambda trace: 1e3 * drift(trace)),
+    ),
+    Metric(
+        name="force_fidelity",
+        heading="correlation of the force on hand and tip",
+        matters=0.01,
+        matters_source=CHOICE,
+        meaning="correlation of the rendered force with the tip's, the channel's delay before",
+        compute=_of("tip_force", lambda trace: force_fidelity(trace, _delay_back(trace))),
+        lower_is_better=False,
+    ),
+    Metric(
+        name="transmitted_stiffness_n_per_m",
+        heading="stiffness felt in contact [N/m]",
+        matters=1.0,
+        matters_source=CHOICE,
+        meaning="stiffness that the hand feels while it knows of a contact",
+        compute=_of("tip_force", lambda trace: _impedance(trace)[0]),
+        lower_is_better=None,
+    ),
+    Metric(
+        name="transmitted_damping_ns_per_m",
+        heading="damping felt in contact [N s/m]",
+        matters=0.1,
+        matters_source=CHOICE,
+        meaning="damping that the hand feels while it knows of a contact",
+        compute=_of("tip_force", lambda trace: _impedance(trace)[1]),
+        lower_is_better=None,
     ),
     Metric(
         name="energy_residual_j",

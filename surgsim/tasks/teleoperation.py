@@ -19,6 +19,7 @@ from surgsim.tasks.success import RunColumns, Success
 from surgsim.tasks.teleoperation_program import (
     GoalConfig,
     board_goals,
+    conducted,
     goals_success,
     rings_success,
     way_points,
@@ -135,10 +136,10 @@ class TeleoperationConfig(PartConfig):
         return Teleoperation(self, np.array(start), period_s, seed or np.random.SeedSequence(0))
 
     def success(self, run: RunColumns) -> Success:
-        """Whether every ring is on its peg, or every goal was reached."""
+        """Whether every ring is on its peg, or every goal was reached, passively and with rest at the end."""
         if self.program == "peg_and_ring":
-            return rings_success(run)
-        return goals_success(run, len(self.goals))
+            return conducted(rings_success(run), run)
+        return conducted(goals_success(run, len(self.goals)), run)
 
 
 class Teleoperation:
@@ -201,7 +202,8 @@ class Teleoperation:
             side.control.coordinates = c.passivity_control.port_force == "coordinating"
         near.start_tip[:] = self._start
         self._console.describe(near.console)
-        self._noise_m = describe_operator(near.operator, c.operator, self._period)
+        round_trip = sum(channel.delay_s for channel in self._channels)
+        self._noise_m = describe_operator(near.operator, c.operator, self._period, round_trip)
         near.operator.goals, near.operator.goal_count = LAW_SIZE, len(self._goals)
         near.operator.tremor, near.operator.scatter = at.tremor, at.scatter
         lines = (

@@ -108,7 +108,9 @@ def test_what_empty_tanks_gave_and_how_hard_the_command_was_changed(trace_of):
     qdot[3:, 2] = -0.4
     first = next(block.columns[0] for block in trace.blocks if block.name == "qdot_ref")
     at = [name for block in trace.blocks for name in block.columns].index(first)
-    trace.data[:, at : at + 7] = qdot
+    data = trace.data.copy()
+    data[:, at : at + 7] = qdot
+    trace = Trace(data, trace.blocks, trace.meta)
     limit = trace.meta.limits["acceleration"][2]
     assert _value(trace, "acceleration_limit_ratio") == pytest.approx(0.4 / PERIOD_S / limit)
 
