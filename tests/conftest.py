@@ -123,7 +123,8 @@ def trace_of() -> Callable[..., Trace]:
         limits = {name: [float(i)] * 7 for i, name in enumerate(names, start=1)}
         limits["q_min"] = [-2.0] * 7
         ending = Ending(outcome=outcome, t_s=period_s * (rows - 1))
-        meta = TraceMeta(scenario={"name": "made"}, control_period_s=period_s, limits=limits, ending=ending)
+        made = {"name": "made", "simulation": {"timestep_s": period_s, "control_period_s": period_s}}
+        meta = TraceMeta(scenario=made, control_period_s=period_s, limits=limits, ending=ending)
         return Trace(data, base_blocks(7), meta)
 
     return make

@@ -27,6 +27,7 @@ LAYERS = (
     "surgsim.plant.truth",
     "surgsim.plant.records",
     "surgsim.plant.shaft",
+    "surgsim.plant.explicit",
     "surgsim.plant.bore",
     "surgsim.plant.part",
     "surgsim.plant.disturbances",

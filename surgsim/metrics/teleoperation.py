@@ -13,6 +13,14 @@ from numpy.typing import NDArray
 from surgsim.metrics.accuracy import rms
 from surgsim.metrics.force import largest
 from surgsim.metrics.metric import CHOICE, FORCE_RESOLUTION, REPEATABILITY, Metric, with_block
+from surgsim.teleop.judgement import (
+    drift,
+    end_speed,
+    excess_j,
+    force_fidelity,
+    toggles_per_s,
+    transmitted_impedance,
+)
 from surgsim.trace.trace import Trace
 
 Array = NDArray[np.float64]
@@ -21,6 +29,7 @@ FREE_SLACK_M_PER_S = 1e-4
 FREE_FORCE_N = 0.1
 _CONSTRAINTS = ("passivity_active", "planes_active", "qp_relaxed")
 _ALONE = ("ring_state", "trocar_force")
+_PRESSING = {"tissue", "contact_wall"}
 _PUSHING = {"push", "guiding_hand"}
 
 
@@ -82,18 +91,21 @@ def energy_residual(trace: Trace) -> Array:
     if np.isfinite(trace["tank_account_residual_j"]).all():
         total += np.abs(trace["tank_account_residual_j"])
     touch = _work_of_touch(trace)
-    if touch is not None:  # one row late: of the instant at which the last step began
-        total[:-1] += np.abs(trace["environment_work_j"][:-1] + touch[1:])
+    if touch is not None:  # late: of the instant at which the last physics step began
+        late = trace.meta.scenario["simulation"]["timestep_s"] / trace.meta.control_period_s
+        total[:-1] += np.abs(trace["environment_work_j"][:-1] + touch[:-1] + late * np.diff(touch))
     return total
 
 
 def _work_of_touch(trace: Trace) -> Array | None:
     """Work of what the tip touches on the arm, by the plant's ledger (rows,) [J]; None if more is in it."""
-    acting = {disturbance["type"] for disturbance in trace.meta.scenario.get("disturbances", ())}
-    if any(name in trace for name in _ALONE) or ("tissue" in acting and acting & _PUSHING):
+    scenario = trace.meta.scenario
+    acting = {part["type"] for key in ("disturbances", "props") for part in scenario.get(key, ())}
+    pressing = acting & _PRESSING
+    if any(name in trace for name in _ALONE) or (pressing and acting & _PUSHING):
         return None
     touch = trace["energy_contact_work_j"]
-    return touch + trace["energy_applied_work_j"] if "tissue" in acting else touch
+    return touch + trace["energy_applied_work_j"] if pressing else touch
 
 
 def energy_exchanged(trace: Trace) -> float:
@@ -111,6 +123,30 @@ def _tank_min(trace: Trace) -> float:
     if not np.isfinite(trace["tank_account_residual_j"]).all():
         return math.nan
     return float(min(trace["tank_operator_j"].min(), trace["tank_remote_j"].min()))
+
+
+def tank_deficit(trace: Trace) -> float:
+    """What was taken from empty tanks, both together [J]; NaN without tanks."""
+    if not np.isfinite(trace["tank_account_residual_j"]).all():
+        return math.nan
+    return float(trace["tank_operator_deficit_j"][-1] + trace["tank_remote_deficit_j"][-1])
+
+
+def acceleration_ratio(trace: Trace) -> float:
+    """Largest change of a joint's commanded velocity from tick to tick, over its acceleration limit."""
+    steps = np.abs(np.diff(trace.block("qdot_ref"), axis=0)) / trace.meta.control_period_s
+    ratio: Array = steps / np.array(trace.meta.limits["acceleration"])
+    return float(np.nanmax(ratio)) if np.isfinite(ratio).any() else math.nan
+
+
+def _delay_back(trace: Trace) -> float:
+    """Delay of the channel back [s]."""
+    task = trace.meta.scenario["task"]
+    return float((task.get("channel_back") or task["channel"])["delay_s"])
+
+
+def _impedance(trace: Trace) -> tuple[float, float]:
+    return transmitted_impedance(trace, _delay_back(trace))
 
 
 def plane_overshoot(trace: Trace) -> float:
@@ -162,12 +198,87 @@ METRICS = (
         lower_is_better=False,
     ),
     Metric(
+        name="tank_deficit_j",
+        heading="energy taken from empty tanks [J]",
+        matters=1e-3,
+        matters_source=CHOICE,
+        meaning="energy that was taken from the tanks though they were empty",
+        compute=_teleoperated(tank_deficit),
+    ),
+    Metric(
+        name="acceleration_limit_ratio",
+        heading="change of the commanded joint velocity, over the limit",
+        matters=0.01,
+        matters_source=CHOICE,
+        meaning="largest change of a joint's commanded velocity in a tick, over its acceleration limit",
+        compute=_of("qdot_ref", acceleration_ratio),
+    ),
+    Metric(
         name="delivered_max_j",
         heading="energy delivered, largest [J]",
         matters=1e-3,
         matters_source=CHOICE,
-        meaning="largest net energy that hand and surroundings got; above 0 is active behaviour",
+        meaning="largest net energy that hand and surroundings got; what the tanks held is theirs to give",
         compute=_teleoperated(lambda trace: float(np.max(trace["delivered_j"]))),
+    ),
+    Metric(
+        name="delivered_excess_j",
+        heading="energy delivered beyond the stored [J]",
+        matters=1e-3,
+        matters_source=CHOICE,
+        meaning="energy delivered, less what the tanks held at first; above 0 is active",
+        compute=_teleoperated(excess_j),
+    ),
+    Metric(
+        name="contact_toggles_max_per_s",
+        heading="contact begun or ended, most in a second [1/s]",
+        matters=2.0,
+        matters_source=CHOICE,
+        meaning="most beginnings and ends of contact at the tip within a second",
+        compute=_of("tip_force", toggles_per_s),
+    ),
+    Metric(
+        name="end_speed_mm_per_s",
+        heading="speed at the end, largest [mm/s]",
+        matters=1.0,
+        matters_source=CHOICE,
+        meaning="largest speed of handle or tip in the last half second",
+        compute=_teleoperated(lambda trace: 1e3 * end_speed(trace)),
+    ),
+    Metric(
+        name="drift_end_mm",
+        heading="tip from where the master points, at the end [mm]",
+        matters=0.1,
+        matters_source=REPEATABILITY,
+        meaning="distance of the tip from where the master points, at the end",
+        compute=_teleoperated(lambda trace: 1e3 * drift(trace)),
+    ),
+    Metric(
+        name="force_fidelity",
+        heading="correlation of the force on hand and tip",
+        matters=0.01,
+        matters_source=CHOICE,
+        meaning="correlation of the rendered force with the tip's, the channel's delay before",
+        compute=_of("tip_force", lambda trace: force_fidelity(trace, _delay_back(trace))),
+        lower_is_better=False,
+    ),
+    Metric(
+        name="transmitted_stiffness_n_per_m",
+        heading="stiffness felt in contact [N/m]",
+        matters=1.0,
+        matters_source=CHOICE,
+        meaning="stiffness that the hand feels while it knows of a contact",
+        compute=_of("tip_force", lambda trace: _impedance(trace)[0]),
+        lower_is_better=None,
+    ),
+    Metric(
+        name="transmitted_damping_ns_per_m",
+        heading="damping felt in contact [N s/m]",
+        matters=0.1,
+        matters_source=CHOICE,
+        meaning="damping that the hand feels while it knows of a contact",
+        compute=_of("tip_force", lambda trace: _impedance(trace)[1]),
+        lower_is_better=None,
     ),
     Metric(
         name="energy_residual_j",

@@ -16,7 +16,7 @@ from surgsim.plant.base import Plant
 from surgsim.scenario.schema import Scenario
 from surgsim.simulate.reach import Reach
 from surgsim.simulate.start import Places, check_path, check_through_port, solve_start
-from surgsim.tasks.base import EnteringTaskConfig, Task, TaskConfig
+from surgsim.tasks.base import EnteringTaskConfig, Task, TaskConfig, WeighsForce
 
 Array = NDArray[np.float64]
 MOST_TICKS = 4_000_000
@@ -101,7 +101,10 @@ def _build_task(scenario: Scenario, start: Array) -> Task:
     """
     config, period = scenario.task, scenario.simulation.control_period_s
     if not _enters(config):
-        return config.build(start, period, scenario.task_seed())
+        task = config.build(start, period, scenario.task_seed())
+        if isinstance(task, WeighsForce):
+            task.force_acted_over(scenario.simulation.timestep_s)
+        return task
     if scenario.trocar is None:
         raise SurgsimError(f"{scenario.name}: task '{config.type}' needs a trocar")
     try:

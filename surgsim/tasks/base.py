@@ -182,6 +182,15 @@ class EnteringTaskConfig(TaskConfig, Protocol):
         ...
 
 
+@runtime_checkable
+class WeighsForce(Protocol):
+    """A task that reckons with the measured force on the tip, and has to know of when it is."""
+
+    def force_acted_over(self, time_s: float) -> None:
+        """The measured force is the mean over the last `time_s` of the control period [s]: a physics step."""
+        ...
+
+
 class TimedTask(ABC):
     """A task whose command is a function of time alone."""
 

@@ -19,6 +19,7 @@ from surgsim.tasks.success import RunColumns, Success
 from surgsim.tasks.teleoperation_program import (
     GoalConfig,
     board_goals,
+    conducted,
     goals_success,
     rings_success,
     way_points,
@@ -74,7 +75,7 @@ class TeleoperationConfig(PartConfig):
         channel_back: The channel back; null: as `channel`.
         receiver: How long a set point is believed, on both sides.
         tanks: The energy tank of each side.
-        passivity_control: Limits of the passivity controller, on both sides.
+        passivity_control: The passivity controller of each side.
     """
 
     type: Literal["teleoperation"] = "teleoperation"
@@ -135,10 +136,10 @@ class TeleoperationConfig(PartConfig):
         return Teleoperation(self, np.array(start), period_s, seed or np.random.SeedSequence(0))
 
     def success(self, run: RunColumns) -> Success:
-        """Whether every ring is on its peg, or every goal was reached."""
+        """Whether every ring is on its peg, or every goal was reached, passively and with rest at the end."""
         if self.program == "peg_and_ring":
-            return rings_success(run)
-        return goals_success(run, len(self.goals))
+            return conducted(rings_success(run), run)
+        return conducted(goals_success(run, len(self.goals)), run)
 
 
 class Teleoperation:
@@ -183,20 +184,26 @@ class Teleoperation:
         """Let `hand` take the simulated operator's place, from the next `reset` on."""
         self._hand = hand
 
+    def force_acted_over(self, time_s: float) -> None:
+        """The measured force is of the last `time_s` of each control period [s], of all of it until told."""
+        laid_over(Law, self.gains).force_share = time_s / self._period
+
     def _describe(self, lives: Sequence[int]) -> None:
         """Fill the numbers; those of the mapping and of the hand come with `reset`."""
         c, law, at = self._c, laid_over(Law, self.gains), self._places
         near, far = law.operator, law.remote
-        law.hold_end_s, law.start[:] = c.hold_end_s, self._start
+        law.hold_end_s, law.start[:], law.force_share = c.hold_end_s, self._start, 1.0
         for side in (near, far):
             take(side, c)
             side.passivity, side.period_s = MODES[c.passivity], self._period
             take(side.receiver, c.receiver)
             take(side.tank, c.tanks)
             take(side.control, c.passivity_control)
+            side.control.coordinates = c.passivity_control.port_force == "coordinating"
         near.start_tip[:] = self._start
         self._console.describe(near.console)
-        self._noise_m = describe_operator(near.operator, c.operator, self._period)
+        round_trip = sum(channel.delay_s for channel in self._channels)
+        self._noise_m = describe_operator(near.operator, c.operator, self._period, round_trip)
         near.operator.goals, near.operator.goal_count = LAW_SIZE, len(self._goals)
         near.operator.tremor, near.operator.scatter = at.tremor, at.scatter
         lines = (
@@ -225,7 +232,7 @@ class Teleoperation:
         for side_law, side in ((law.operator, near), (law.remote, far)):
             fill_tank(side_law.tank, side.tank)
             expect(side_law.receiver, side.receiver, memory)
-        state.work.p[:] = self._start
+        state.work.p[:] = far.reference[:] = self._start
         state.forth.drawn = state.back.drawn = near.operator.shaken = near.operator.scattered = DRAWN
         self._random = [np.random.default_rng(_child(self._seed, *key)) for key in _STREAMS]
         self.refill(1)
@@ -280,6 +287,7 @@ class Teleoperation:
         """Step both sides to `t_s` [s]; without feedback the tip is taken to be at its start, untouched."""
         told, kernel = new_feedback(), as_parameter(teleoperate, task_signature())
         told.t_s, told.p_WT[:] = t_s, self._start if feedback is None else feedback.p_WT
+        told.v_WT[:] = 0.0 if feedback is None else feedback.v_WT
         told.f_T[:] = 0.0 if feedback is None else feedback.f_T
         self.refill(1)
         if self._hand is None:

@@ -10,6 +10,7 @@ from surgsim.catalog import PartConfig
 from surgsim.models.config import Vec3
 from surgsim.models.peg_board import PegBoardLayout, transfer_goals
 from surgsim.tasks.success import RunColumns, Success
+from surgsim.teleop.judgement import faults
 from surgsim.teleop.operator import Goal
 
 Array = NDArray[np.float64]
@@ -105,3 +106,12 @@ def goals_success(run: RunColumns, count: int) -> Success:
         left = f"the operator was still at goal {at + 1} of {count} when time was up"
         return Success(done=False, reason=left + (f", {missed} missed" if missed else ""))
     return Success(done=missed == 0, reason=f"{count - missed} of {count} goals were reached")
+
+
+def conducted(found: Success, run: RunColumns) -> Success:
+    """`found`, but not done where the run gave out energy that was not stored, or does not end at rest.
+
+    A run without an energy account is judged by its goals alone.
+    """
+    wrong = faults(run) if found.done and "delivered" in run else []
+    return Success(done=False, reason="; ".join([found.reason, *wrong])) if wrong else found

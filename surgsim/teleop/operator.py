@@ -3,7 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import ClassVar, Protocol
+from typing import ClassVar, Literal, Protocol
 
 import numpy as np
 from pydantic import NonNegativeFloat, PositiveFloat
@@ -27,13 +27,14 @@ class OperatorConfig(PartConfig):
     harder raises both. The orientation values only keep the grip upright and are assumptions.
 
     Against delay the operator moves and waits (Ferrell, IEEE Trans. Hum. Factors Electron. 6, 1965): after
-    a movement it waits `expected_delay_s`, the round trip it is used to, then for the tip on the screen to
-    rest, and only then corrects. Every decision takes `reaction_s`. A goal at the place of the one before is
-    for the jaws alone: the hand stays, and waits until it must have seen them act.
+    a movement it waits `expected_delay_s`, the round trip it is used to (`auto`: that of the channels), then
+    for the tip on the screen to rest, and only then corrects. Every decision takes `reaction_s`. A goal at
+    the place of the one before is for the jaws alone: the hand stays, and waits until it must have seen them
+    act.
     """
 
     reaction_s: NonNegativeFloat = 0.2
-    expected_delay_s: NonNegativeFloat = 0.3
+    expected_delay_s: NonNegativeFloat | Literal["auto"] = "auto"
     rest_speed_m_per_s: PositiveFloat = 0.003
     gaze_time_s: PositiveFloat = 0.08
     stiffness_n_per_m: PositiveFloat = 135.0
@@ -215,8 +216,19 @@ class Operator(Record):
     shake_before: Array
 
 
-def describe_operator(law: OperatorLaw, config: OperatorConfig, period_s: float) -> float:
-    """Fill all numbers but mapping and places; answers the standard deviation of the tremor's noise [m]."""
+def describe_operator(
+    law: OperatorLaw, config: OperatorConfig, period_s: float, round_trip_s: float = 0.0
+) -> float:
+    """Fill all numbers but mapping and places; answers the standard deviation of the tremor's noise [m].
+
+    Args:
+        law: Filled.
+        config: Of the operator.
+        period_s: Control period [s].
+        round_trip_s: Delay of both channels, which the operator expects if it is to find out by itself [s].
+    """
+    if config.expected_delay_s == "auto":
+        config = config.model_copy(update={"expected_delay_s": round_trip_s})
     take(law, config)
     take(law.grip, config)
     take(law.reach, config.reach)

@@ -6,8 +6,17 @@ from typing import ClassVar
 from surgsim.columns import scalar, vector
 from surgsim.compiled import compiled
 from surgsim.teleop.channel import Channel, ChannelLaw
-from surgsim.teleop.messages import JAW, OFF, POSITION, TANK, TDPA, VELOCITY
-from surgsim.teleop.passivity_control import PassivityLaw, PortEnergy, admittance_control, observe, observed
+from surgsim.teleop.messages import JAW, OFF, POSITION, TDPA, VELOCITY
+from surgsim.teleop.passivity_control import (
+    PassivityLaw,
+    PortEnergy,
+    admittance_control,
+    compensate_drift,
+    coordinating_force,
+    keep_lead,
+    observe,
+    observed,
+)
 from surgsim.teleop.receiver import Receiver, ReceiverLaw, receive, trust
 from surgsim.teleop.tank import Tank, TankLaw, budget, exchange, level, send_surplus
 from surgsim.tick.algebra import dot, norm
@@ -62,35 +71,46 @@ class RemoteSide(Record):
         budget_j: Right side of the passivity row, T - epsilon [J]; infinite without a tank.
         wanted: Velocity before the passivity controller (3,) [m/s].
         velocity: v_d (3,) [m/s].
+        gap: From the tip, or its reference, to where the master is (3,) [m].
+        reference: The integral of v_d, for the passivity controller (3,) [m].
+        force: Force at the remote port (3,) [N].
         receiver: Of what comes from the operator's side.
         tank: The energy tank.
         port: The passivity observer.
     """
 
-    SHAPES: ClassVar[dict[str, str]] = {"wanted": "3", "velocity": "3"}
+    SHAPES: ClassVar[dict[str, str]] = {
+        name: "3" for name in ("wanted", "velocity", "gap", "reference", "force")
+    }
     environment_j: float
     trust: float
     jaw: float
     budget_j: float
     wanted: Array
     velocity: Array
+    gap: Array
+    reference: Array
+    force: Array
     receiver: Receiver
     tank: Tank
     port: PortEnergy
 
 
 @compiled
-def _settle(law: RemoteSideLaw, side: RemoteSide, force: Array, work_j: float, received_j: float) -> float:
-    """Book the last period; the energy to send [J]."""
-    if law.passivity == OFF:
-        return 0.0
-    if law.passivity == TDPA:
-        work = law.period_s * dot(force, side.wanted)
-        burnt = work - law.period_s * dot(force, side.velocity)
-        observe(side.port, work, burnt, received_j)
-        return max(-work, 0.0)
-    exchange(law.tank, side.tank, work_j, received_j)
-    return send_surplus(law.tank, side.tank, law.period_s)
+def _master_s_order(law: RemoteSideLaw, side: RemoteSide, position: Array, t_s: float) -> bool:
+    """Trust, jaw and the master's velocity as `side.wanted`; whether anything was received yet.
+
+    `side.gap` is filled with how far the master is from `position` (3,) [m].
+    """
+    side.trust = trust(law.receiver, side.receiver, t_s)
+    if side.receiver.highest < 0:
+        return False
+    order = side.receiver.content
+    side.jaw = order[JAW]
+    for i in range(3):
+        side.wanted[i] = side.trust * order[VELOCITY + i]
+        side.gap[i] = order[POSITION + i] - position[i]
+    return True
 
 
 @compiled
@@ -100,17 +120,41 @@ def _set_point(law: RemoteSideLaw, side: RemoteSide, position: Array, t_s: float
     The second term keeps lost packets from adding up to an offset, and is cut at `drift_speed_m_per_s`. With
     drift_gain 0 the command is the paper's pure velocity.
     """
-    side.trust = trust(law.receiver, side.receiver, t_s)
-    if side.receiver.highest < 0:
+    if not _master_s_order(law, side, position, t_s):
         return
-    order, drift = side.receiver.content, side.wanted
-    side.jaw = order[JAW]
-    for i in range(3):
-        drift[i] = law.drift_gain_per_s * (order[POSITION + i] - position[i])
-    speed = norm(drift)
+    speed = law.drift_gain_per_s * norm(side.gap)
     cut = law.drift_speed_m_per_s / speed if speed > law.drift_speed_m_per_s else 1.0
     for i in range(3):
-        side.wanted[i] = side.trust * (order[VELOCITY + i] + cut * drift[i])
+        side.wanted[i] += side.trust * (cut * (law.drift_gain_per_s * side.gap[i]))
+        side.velocity[i] = side.wanted[i]
+
+
+@compiled
+def _observed_set_point(
+    law: RemoteSideLaw, side: RemoteSide, position: Array, velocity: Array, t_s: float, received_j: float
+) -> float:
+    """v_d as time-domain passivity control lets it through; the energy that enters the channel here [J].
+
+        v_d = trust (v + c drift_gain (x - x_d)) - alpha F,   x_d the integral of v_d
+
+    The factor c keeps the pull to what the received energy pays for, where the paper closes the whole gap in
+    a period: steps of the velocity, which an arm with limits answers with forces of its own.
+    """
+    control, port, force = law.control, side.port, side.force
+    port.received_j += received_j
+    keep_lead(control, side.reference, position)
+    if control.coordinates:
+        coordinating_force(control, side.reference, position, side.velocity, velocity, force)
+    if _master_s_order(law, side, side.reference, t_s):
+        for i in range(3):
+            side.gap[i] *= side.trust * law.drift_gain_per_s
+        compensate_drift(port, side.gap, force, law.period_s, law.drift_speed_m_per_s, side.wanted)
+    admittance_control(control, port, side.wanted, force, law.period_s, side.velocity)
+    work = law.period_s * dot(force, side.wanted)
+    observe(port, work, work - law.period_s * dot(force, side.velocity), 0.0)
+    for i in range(3):
+        side.reference[i] += law.period_s * side.velocity[i]
+    return max(-work, 0.0)
 
 
 @compiled
@@ -122,6 +166,7 @@ def step_remote_side(
     memory: Array,
     t_s: float,
     position: Array,
+    velocity: Array,
     force: Array,
     work_j: float,
 ) -> float:
@@ -135,6 +180,7 @@ def step_remote_side(
         memory: All memory, among it packets.
         t_s: Time [s].
         position: Tip position now (3,) [m].
+        velocity: Tip velocity now (3,) [m/s].
         force: Force of the tip on its environment now (3,) [N].
         work_j: Energy that the tip gave to its environment in the last period; negative if it absorbed some.
 
@@ -143,13 +189,17 @@ def step_remote_side(
     """
     received = receive(law.receiver, side.receiver, line, channel, memory, t_s)
     side.environment_j += work_j
-    energy = _settle(law, side, force, work_j, received)
-    _set_point(law, side, position, t_s)
+    side.budget_j = math.inf
     for i in range(3):
-        side.velocity[i] = side.wanted[i]
+        side.force[i] = force[i]
     if law.passivity == TDPA:
-        admittance_control(law.control, side.port, side.wanted, force, law.period_s, side.velocity)
-    side.budget_j = budget(law.tank, side.tank) if law.passivity == TANK else math.inf
+        return _observed_set_point(law, side, position, velocity, t_s, received)
+    _set_point(law, side, position, t_s)
+    if law.passivity == OFF:
+        return 0.0
+    exchange(law.tank, side.tank, work_j, received)
+    energy = send_surplus(law.tank, side.tank, law.period_s)
+    side.budget_j = budget(law.tank, side.tank)
     return energy
 
 

@@ -53,6 +53,7 @@ class Law(Record):
 
     Attributes:
         hold_end_s: Time at rest after the operator is done [s].
+        force_share: Share of a control period, its last, over which the measured force acted.
         start: The tip's place at first (3,) [m].
         operator: The operator's side.
         remote: The remote side.
@@ -62,6 +63,7 @@ class Law(Record):
 
     SHAPES: ClassVar[dict[str, str]] = {"start": "3"}
     hold_end_s: float
+    force_share: float
     start: Array
     operator: OperatorSideLaw
     remote: RemoteSideLaw
@@ -161,11 +163,13 @@ def teleoperate(gains: Array, feedback: Feedback, memory: Array, out: Command) -
     if status != GOES_ON:
         return status
     send(law.forth, state.forth, memory, t_s, operator.content, energy)
-    work = add_tip_work(state.work, feedback.p_WT, feedback.f_T)
+    work = add_tip_work(state.work, feedback.p_WT, feedback.f_T, law.force_share)
     p, force = state.content[POSITION : POSITION + 3], state.content[FORCE : FORCE + 3]
     for i in range(3):
         p[i], force[i] = feedback.p_WT[i], -feedback.f_T[i]
-    energy = step_remote_side(law.remote, remote, law.forth, state.forth, memory, t_s, p, force, work)
+    energy = step_remote_side(
+        law.remote, remote, law.forth, state.forth, memory, t_s, p, feedback.v_WT, force, work
+    )
     send(law.back, state.back, memory, t_s, state.content, energy)
     if operator.hand.done and not state.is_done:
         state.is_done, state.done_s = 1, t_s

@@ -22,27 +22,29 @@ class TipWork(Record):
 
 
 @compiled
-def add_tip_work(last: TipWork, p: Array, f_T: Array) -> float:
+def add_tip_work(last: TipWork, p: Array, f_T: Array, share: float) -> float:
     """Energy given away since the last call [J], by the trapezoidal rule.
 
-    The force f_k known at tick k acted over the step that ended there, so it belongs to the instant of
-    p_{k-1}. The work over (p_{k-2}, p_{k-1}) is therefore
+    The force f_k known at tick k acted over the last physics step before it, so it belongs to the instant at
+    which that step began, a share a of the control period ago, when the tip was at about
 
-        W = -(f_{k-1} + f_k)/2 . (p_{k-1} - p_{k-2}),
+        P_k = p_k - a (p_k - p_{k-1}).
 
-    and of the last step only -f_k . (p_k - p_{k-1}) is known, which the next tick corrects. Pairing f_k with
-    p_k instead would book a spring of stiffness k as a damper of k T_s. Exact for a linear spring if the
-    control period is one physics step; with n steps f_k is up to (n-1)/n of a period younger than assumed.
+    The work over (P_{k-1}, P_k) is W = -(f_{k-1} + f_k)/2 . (P_k - P_{k-1}), and from P_k on only
+    -f_k . (p_k - P_k) is known, which the next tick corrects. Pairing f_k with p_k instead would book a
+    spring of stiffness k as a damper of k a T_s. Exact for a linear spring if the control period is one
+    physics step, a = 1; else of second order in the period.
 
     Args:
         last: At first the tip's position at the start, and zeros.
         p: Tip position now (3,) [m].
-        f_T: Force on the tip over the step that ended now (3,) [N].
+        f_T: Force on the tip over the physics step that ended now (3,) [N].
+        share: a, the physics step over the control period.
     """
-    change = work = 0.0
+    work = 0.0
     for i in range(3):
-        change += (f_T[i] - last.f[i]) * last.step[i]
-    for i in range(3):
-        last.step[i], last.p[i], last.f[i] = p[i] - last.p[i], p[i], f_T[i]
-        work += f_T[i] * last.step[i]
-    return -0.5 * change - work
+        step = p[i] - last.p[i]
+        known = (1.0 - share) * step + share * last.step[i]
+        work -= 0.5 * (last.f[i] + f_T[i]) * known + share * (f_T[i] * step - last.f[i] * last.step[i])
+        last.step[i], last.p[i], last.f[i] = step, p[i], f_T[i]
+    return work

@@ -260,7 +260,11 @@ def test_the_full_suite_leaves_nothing_out():
     paths = [name for name in shipped() if name.startswith(("circle", "sinusoid", "spiral"))]
     paths = [name for name in paths if name.endswith(compared)]
     assert sorted(suite.scenarios) == sorted(paths)
-    elsewhere = {"passive_convex", "hands_on_admittance"}  # made for an operator, and for a hand
+    elsewhere = {
+        "passive_convex",
+        "passive_kinetic",
+        "hands_on_admittance",
+    }  # made for an operator, and for a hand
     elsewhere |= {"rcm_interaction_force", "rcm_port_admittance"}  # for a wall
     elsewhere |= {
         "rcm_elastic_dynamics",

@@ -95,6 +95,26 @@ def test_the_work_to_and_fro_is_exchanged_energy(trace_of):
     assert teleoperation.energy_exchanged(_trace(trace_of, blocks)) == 9.0
 
 
+def test_what_empty_tanks_gave_and_how_hard_the_command_was_changed(trace_of):
+    deficit = np.linspace(0.0, 0.07, ROWS)
+    blocks = {
+        **_ledger(),
+        "tank_operator_deficit": ("j", 0.5 * deficit),
+        "tank_remote_deficit": ("j", deficit),
+    }
+    trace = _trace(trace_of, {**blocks, "velocity_command": ("m_per_s", STILL)})
+    assert _value(trace, "tank_deficit_j") == pytest.approx(0.105)
+    qdot = np.zeros((ROWS, 7))
+    qdot[3:, 2] = -0.4
+    first = next(block.columns[0] for block in trace.blocks if block.name == "qdot_ref")
+    at = [name for block in trace.blocks for name in block.columns].index(first)
+    data = trace.data.copy()
+    data[:, at : at + 7] = qdot
+    trace = Trace(data, trace.blocks, trace.meta)
+    limit = trace.meta.limits["acceleration"][2]
+    assert _value(trace, "acceleration_limit_ratio") == pytest.approx(0.4 / PERIOD_S / limit)
+
+
 def test_tanks_master_and_operator(trace_of):
     level = np.full(ROWS, 0.2)
     low = level.copy()

@@ -14,7 +14,10 @@ from surgsim.teleop.passivity_control import (
     PassivityLaw,
     PortEnergy,
     admittance_control,
+    compensate_drift,
+    coordinating_force,
     impedance_control,
+    keep_lead,
     observe,
     observed,
 )
@@ -80,6 +83,31 @@ def test_a_debt_above_the_limit_is_carried_over():
     found = controlled(impedance_control, state, zero, velocity, limited)
     assert found == pytest.approx(-10.0 * velocity)
     assert controlled(impedance_control, state, velocity, zero, limited) == pytest.approx(velocity)
+
+
+def test_the_coordinating_force_is_that_of_the_coupling_and_its_reference_keeps_near():
+    rng = np.random.default_rng(0)
+    law = limits(coupling_stiffness_n_per_m=300.0, coupling_damping_ns_per_m=7.0, coupling_lead_m=0.5)
+    for _ in range(50):
+        x_d, x, v_d, v = rng.normal(size=(4, 3))
+        lead = (x_d - x) * min(1.0, 0.5 / np.linalg.norm(x_d - x))
+        found = np.zeros(3)
+        keep_lead(law, x_d, x)
+        coordinating_force(law, x_d, x, v_d, v, found)
+        assert x_d == pytest.approx(x + lead)
+        assert found == pytest.approx(300.0 * lead + 7.0 * (v_d - v))
+
+
+@settings(max_examples=100, deadline=None)
+@given(pull=VECTOR, force=VECTOR, velocity=VECTOR, level=st.floats(-1e-3, 1e-3))
+def test_drift_is_compensated_as_far_as_the_received_energy_pays(pull, force, velocity, level):
+    state, moved = port(received_j=max(level, 0.0), out_j=max(-level, 0.0)), velocity.copy()
+    compensate_drift(state, pull, force, T, 0.5, moved)
+    added, most = moved - velocity, pull * min(1.0, 0.5 / np.linalg.norm(pull))
+    left = max(level - T * max(force @ velocity, 0.0), 0.0)
+    cost = T * float(force @ most)
+    assert added == pytest.approx(most if cost <= left else most * left / cost, abs=1e-12)
+    assert T * float(force @ added) <= left + 1e-12
 
 
 class Mapped:

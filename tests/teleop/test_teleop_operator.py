@@ -33,7 +33,7 @@ class Alone:
     def __init__(self, config, goals, *, scale=0.5, seed=0, periods=40_000):
         self._console, self.law, self.handle = new_console(ConsoleConfig())
         self.operator, self.state, self.action = new(OperatorLaw, 0), new(Operator, 0), new(HandAction, 0)
-        noise = describe_operator(self.operator, config, PERIOD_S)
+        noise = describe_operator(self.operator, config, PERIOD_S, 0.3)
         align(self.operator.mapping, MappingConfig(scale=scale), self.handle.state.position, np.zeros(3))
         self.operator.goal_count, self.operator.scatter = len(goals), 3 * periods
         random = np.random.default_rng(seed)

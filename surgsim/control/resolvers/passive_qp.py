@@ -23,15 +23,17 @@ from surgsim.control.resolvers.program import (
     solve_warm,
 )
 from surgsim.control.resolvers.rows import fill_braking
+from surgsim.control.tip_energy import affordable_speed, fill_tip_inertia
 from surgsim.models.arm import ArmModel
 from surgsim.tick.algebra import dot, norm, times
 from surgsim.tick.arrays import Resolved, Seen
+from surgsim.tick.scratch import scratch_matrix
 from surgsim.tick.status import GOES_ON, INFEASIBLE
 
 Array = NDArray[np.float64]
 
-WEIGHT, SLACK, ROLL_SLACK, K_TIP, K_RCM, SHARE, SPEED, LEAD, WALL_GAIN, WALLS = range(10)
-"""Gains: w, w_s, w_r, k_tip, k_rcm, share of the budget or 0, v_max, lead, walls' gain, first wall."""
+WEIGHT, SLACK, ROLL_SLACK, K_TIP, K_RCM, SHARE, SPEED, LEAD, WALL_GAIN, KINETIC, WALLS = range(11)
+"""Gains: w, w_s, w_r, k_tip, k_rcm, share of the budget or 0, v_max, lead, walls' gain, kinetic, walls."""
 COLUMNS: tuple[Block, ...] = (
     vector("slack", "m_per_s"),
     scalar("slack_roll", "rad_per_s"),
@@ -55,6 +57,7 @@ class PassiveQpConfig(PartConfig):
         k_tip: Feedback of the tip's position [1/s]; 0, as in the paper, follows the commanded velocity alone.
         k_rcm: K_rcm [1/s].
         passivity: Whether the energy budget is a row.
+        kinetic: Whether the commanded velocity is scaled so that the budget covers its kinetic energy.
         budget_share: Share of the tank's budget that one period may spend; 1 is the paper's.
         planes: Virtual walls of the workspace.
         plane_gain_per_s: How fast the tip may approach a wall [1/s].
@@ -70,6 +73,7 @@ class PassiveQpConfig(PartConfig):
     k_tip: NonNegativeFloat = 0.0
     k_rcm: NonNegativeFloat = 5.0
     passivity: bool = True
+    kinetic: bool = False
     budget_share: Annotated[float, Field(gt=0.0, le=1.0)] = 1.0
     planes: tuple[PlaneConfig, ...] = ()
     plane_gain_per_s: PositiveFloat = 20.0
@@ -82,7 +86,7 @@ class PassiveQpConfig(PartConfig):
         n, walls = arm.limits.q_min.size, len(self.planes)
         numbers = [self.velocity_weight, self.slack_weight, self.roll_slack_weight, self.k_tip, self.k_rcm]
         numbers += [self.budget_share * self.passivity, self.tip_speed_max_m_per_s, self.lead_max_m]
-        numbers += [self.plane_gain_per_s]
+        numbers += [self.plane_gain_per_s, self.kinetic]
         text = f"QP: no joint velocity meets the RCM, {walls} planes, the energy budget and the bounds"
         return KernelResolver(
             kernel=passive_qp if self.solver == OWN else SolvedInPython(_solved_in_python, self.solver),
@@ -109,6 +113,13 @@ def passive_qp(gains: Array, seen: Seen, memory: Array, out: Resolved) -> int:
     (`TipCommand.budget`); without one the row is void. An emptied tank allows no more extraction, and never
     asks for motion that refills it. Where bounds of acceleration make the program infeasible, it is solved
     once more without them, and `qp_relaxed` says so; if there is still no answer the outcome is INFEASIBLE.
+
+    That row covers what the tip gives away at the force of now, not the motion that an impact stops. With
+    `kinetic` the command is scaled before,
+
+        v_d := v_d min(1, sqrt(2 (T - epsilon) / v_d' L v_d))
+
+    with the tip's inertia L (RCM held): no row, so that no bound has to give way to it. That is ours.
 
     The torque law follows the resolved motion: J_T q' and its integral, which may lead the measured tip by
     `lead_max_m`. The instrument has no wrist, so of the paper's angular rows the roll is the one left free by
@@ -157,6 +168,17 @@ def _begin(seen: Seen, memory: Array) -> None:
 
 
 @compiled
+def _covered(gains: Array, seen: Seen) -> float:
+    """Share of the commanded velocity whose kinetic energy the budget covers."""
+    if gains[KINETIC] == 0.0 or not math.isfinite(seen.budget_j):
+        return 1.0
+    inertia = scratch_matrix(3, 3)
+    if not fill_tip_inertia(seen, inertia):
+        return 0.0
+    return affordable_speed(inertia, seen.v_WTd, seen.budget_j)
+
+
+@compiled
 def passive_program(gains: Array, seen: Seen, memory: Array, braking: bool) -> Program:
     """The program over (q', s), with the bounds of acceleration or without them.
 
@@ -172,9 +194,10 @@ def passive_program(gains: Array, seen: Seen, memory: Array, braking: bool) -> P
         fill_braking(seen, memory[:n], lower[:n], upper[:n])
     for j in range(size):
         H[j, j] = gains[WEIGHT] if j < n else 2.0 * gains[SLACK if j < size - 1 else ROLL_SLACK]
+    share = _covered(gains, seen)
     for i in range(3):
         G[i, :n] = seen.Jv_WT[i]
-        low[i] = high[i] = seen.v_WTd[i] - gains[K_TIP] * (seen.p_WT[i] - seen.p_WTd[i])
+        low[i] = high[i] = share * seen.v_WTd[i] - gains[K_TIP] * (seen.p_WT[i] - seen.p_WTd[i])
         G[rows - 3 + i, :n] = seen.Jv_WT[i]
         low[rows - 3 + i], high[rows - 3 + i] = -gains[SPEED], gains[SPEED]
         for j in range(n):
@@ -201,7 +224,8 @@ def _answer(
 ) -> None:
     """The answer inside Omega, the motion that the torque law follows, the columns' values, the memory.
 
-    The row of the energy budget and those of the walls are active where they are at their bound.
+    The row of the energy budget and those of the walls are active where they are at their bound; the budget
+    also where the command is scaled to it.
     """
     n = seen.q.size
     G, most = program[4], program[6]
@@ -224,6 +248,8 @@ def _answer(
     for i in range(budget, most.size - 3):
         if dot(G[i], x) >= most[i] - _ACTIVE:
             out.values[_BUDGET if i == budget else _WALLS] += 1.0
+    if _covered(gains, seen) < 1.0:
+        out.values[_BUDGET] = 1.0
     out.residual = norm(x[n : n + 3])
 
 

@@ -135,8 +135,7 @@ class HierarchicalQpConfig(PartConfig):
             *pair(self.rcm_stiffness_per_s2, self.rcm_damping_ratio, bounded),
             *pair(self.tip_stiffness_per_s2, self.tip_damping_ratio, bounded),
             *pair(self.joint_stiffness_per_s2, self.joint_damping_ratio, self.joint_damping_ratio),
-            0.0,
-            0.0,
+            *(0.0,) * (HIERARCHY_GAINS - 6),
         )
 
 

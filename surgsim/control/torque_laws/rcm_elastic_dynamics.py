@@ -47,7 +47,7 @@ class RcmElasticDynamicsConfig(ElasticObserverConfig):
             kernel=rcm_elastic_dynamics,
             arm=arm,
             terms=TERMS,
-            gains=np.concatenate([*pairs, (0.0, 0.0), numbers]),
+            gains=np.concatenate([*pairs, np.zeros(4), numbers]),
             memory_size=self.memory_size(arm.limits.torque.size),
             failures={INFEASIBLE: "no joint acceleration keeps all limits"},
         )

@@ -1,5 +1,7 @@
 """The hierarchy of the laws of inverse dynamics: RCM over tip over posture, at acceleration level."""
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -7,6 +9,7 @@ from surgsim.compiled import compiled
 from surgsim.control.acceleration import TORQUE_SHARE, allows, fill_acceleration_bounds, prioritised
 from surgsim.control.manipulability import fill_velocity_products
 from surgsim.control.rcm import fill_rcm, fill_rcm_bias
+from surgsim.control.tip_energy import fill_held_inertia, limit_press, throttle
 from surgsim.tick.algebra import (
     back_substitute,
     back_substitute_rows,
@@ -21,10 +24,10 @@ from surgsim.tick.scratch import scratch, scratch_matrix
 from surgsim.tick.status import GOES_ON, RANK_LOST
 
 Array = NDArray[np.float64]
-K_RCM, D_RCM, K_TIP, D_TIP, K_JOINT, D_JOINT, SENSOR_DELAY, YIELDS = range(8)
+K_RCM, D_RCM, K_TIP, D_TIP, K_JOINT, D_JOINT, SENSOR_DELAY, YIELDS, VALVE, PRESS = range(10)
 """Places of the gains, with which those of a law begin. The first six go with the bandwidth squared, or with
 the bandwidth, in turn."""
-HIERARCHY_GAINS = 8
+HIERARCHY_GAINS = 10
 TIP, RCM, JOINT, BIAS, DISTURBANCE, LIMITS = range(6)
 """Rows of the terms."""
 TERMS = ("tip", "rcm", "joint", "bias", "observer", "limits")
@@ -88,27 +91,35 @@ def _task_accelerations(
 
 
 @compiled
-def _give_way(A: Array, f: Array, a: Array) -> bool:
-    """Add to `a` the acceleration of the tip along the force `f` on it, the further rows held.
-
-    A is the Cholesky factor of J M^-1 J^T (m, m).
-    """
-    m, size = A.shape[0], dot(f, f)
+def _give_way(inertia: Array, f: Array, a: Array) -> bool:
+    """Add to `a` the acceleration of the tip along the force `f` on it, its inertia (3, 3) [kg] destroyed."""
+    size, moved = dot(f, f), scratch(3)
     if size == 0.0:
         return True
-    inverse, held, moved = scratch_matrix(m, m), scratch_matrix(3, 3), scratch(3)
-    for i in range(m):
-        for j in range(m):
-            inverse[i, j] = 1.0 if i == j else 0.0
-    back_substitute_rows(A, inverse)
-    held[:], moved[:] = inverse[:3, :3], f
-    if not factor(held):
+    moved[:] = f
+    if not factor(inertia):
         return False
-    back_substitute(held, moved)
+    back_substitute(inertia, moved)
     share = dot(f, moved) / size
     for i in range(3):
         a[i] += f[i] * share
     return True
+
+
+@compiled
+def _let_through(gains: Array, model: Model, inertia: Array, seen: Seen, a: Array) -> None:
+    """Limit what drives the tip in `a`, rows J q'': all of it but what its curvature takes."""
+    linear, angular, speed, drive = scratch(3), scratch(3), scratch(3), scratch(3)
+    fill_velocity_products(model.Jv_WT, model.z_W, model.v, linear, angular)
+    times(model.Jv_WT, model.v, speed)
+    for i in range(3):
+        drive[i] = a[i] + linear[i]
+    if gains[PRESS] > 0.0:
+        limit_press(inertia, seen.f_T, gains[PRESS], drive)
+    if gains[VALVE] != 0.0 and math.isfinite(seen.budget_j):
+        throttle(inertia, speed, seen.budget_j, seen.dt_s, drive)
+    for i in range(3):
+        a[i] = drive[i] - linear[i]
 
 
 @compiled
@@ -151,8 +162,13 @@ def fill_terms(
     outer_product(J, Y, A)
     if not factor(A):
         return RANK_LOST
-    if gains[YIELDS] != 0.0 and not _give_way(A, seen.f_T, a):
-        return RANK_LOST
+    if gains[YIELDS] != 0.0:
+        inertia = scratch_matrix(3, 3)
+        fill_held_inertia(A, inertia)
+        if gains[VALVE] != 0.0 or gains[PRESS] > 0.0:
+            _let_through(gains, model, inertia, seen, a)
+        if not _give_way(inertia, seen.f_T, a):
+            return RANK_LOST
     times(J, posture, force)
     for i in range(m):
         force[i] = a[i] - force[i]

@@ -1,10 +1,10 @@
 """RCM inverse dynamics: ours. RCM over tip over posture at acceleration level, disturbances rejected."""
 
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field, NonNegativeFloat, PositiveFloat
+from pydantic import Field, NonNegativeFloat, PositiveFloat, model_validator
 
 from surgsim.catalog import PartConfig
 from surgsim.compiled import compiled
@@ -52,6 +52,10 @@ class RcmInverseDynamicsConfig(PartConfig):
         contact: What becomes of the measured force on the tip: `reject` lets the observer cancel it like
             any disturbance; `yield` cancels it too, but for the tip's acceleration along it, so that the tip
             is an impedance towards what it touches.
+        energy_valve: Whether the command's energy budget covers the tip's kinetic energy at all times, see
+            `surgsim.control.tip_energy.throttle`; needs `yield`, and does nothing without a budget.
+        press_max_n: Largest force with which the tip is driven against what it touches; needs `yield`; null:
+            as far as the torques reach [N].
     """
 
     type: Literal["rcm_inverse_dynamics"] = "rcm_inverse_dynamics"
@@ -66,6 +70,15 @@ class RcmInverseDynamicsConfig(PartConfig):
     full_gain_delay_s: PositiveFloat = 0.01
     sensor_delay_s: NonNegativeFloat = 0.0
     contact: Literal["reject", "yield"] = "reject"
+    energy_valve: bool = False
+    press_max_n: PositiveFloat | None = None
+
+    @model_validator(mode="after")
+    def _knows_the_drive(self) -> Self:
+        for key in ("energy_valve", "press_max_n"):
+            if getattr(self, key) and self.contact != "yield":
+                raise ValueError(f"{key} needs contact: yield, or the observer drives the tip past it")
+        return self
 
     def build(self, arm: ArmModel) -> KernelTorqueLaw:
         """The law; memory of the disturbance observer, then of the delay estimate."""
@@ -84,6 +97,8 @@ class RcmInverseDynamicsConfig(PartConfig):
                     2.0 * self.joint_damping_ratio * self.joint_stiffness_per_s2**0.5,
                     self.sensor_delay_s,
                     self.contact == "yield",
+                    self.energy_valve,
+                    self.press_max_n or 0.0,
                     self.observer_gain,
                     self.most_delay_ticks,
                     self.full_gain_delay_s,

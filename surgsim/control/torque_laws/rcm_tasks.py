@@ -44,7 +44,7 @@ class RcmTasksConfig(PartConfig):
             (self.tip_stiffness_per_s2, self.tip_damping_ratio),
             (self.joint_stiffness_per_s2, self.joint_damping_ratio),
         )
-        return [gain for k, ratio in pairs for gain in (k, 2.0 * ratio * k**0.5)] + [0.0, 0.0]
+        return [gain for k, ratio in pairs for gain in (k, 2.0 * ratio * k**0.5)] + [0.0] * 4
 
 
 @compiled

@@ -9,11 +9,10 @@ from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from surgsim.compiled import compiled
-from surgsim.errors import SurgsimError
 from surgsim.models.build import Scene
 from surgsim.models.config import Vec3
 from surgsim.plant.disturbances.base import Disturbance, DisturbanceConfig, Spread, spread_factor
-from surgsim.plant.shaft import bend_joints, lateral_masses, piece_lengths
+from surgsim.plant.explicit import FADE_M, check_step, needs_instrument, pressure
 from surgsim.spatial import unit
 from surgsim.tick.algebra import dot
 from surgsim.tick.arrays import World
@@ -23,10 +22,6 @@ from surgsim.tick.status import GOES_ON
 from surgsim.tick.views import push_at, site_place
 
 Array = NDArray[np.float64]
-FADE_M = 0.0005
-"""d_0: damping and drag fade in over this depth, so that the force is continuous at touch."""
-LIGHTEST_TIP_KG = 0.2
-"""Least effective mass that the timestep is checked for; the shipped arms' tips have 0.24 kg and more."""
 _SITE = int(mujoco.mjtObj.mjOBJ_SITE)
 POINT, NORMAL, LAW = slice(0, 3), slice(3, 6), slice(6, 9)
 """Gains: p_0 (3,) [m], n (3,), k, b, c (3,)."""
@@ -52,8 +47,9 @@ def tissue_force(tip: Array, velocity: Array, point: Array, normal: Array, law: 
         return np.zeros(3)
     share = min(1.0, p / FADE_M)
     rate = dot(normal, velocity)
-    pressure = max(0.0, law[0] * p - law[1] * share * rate)
-    force: Array = pressure * normal - law[2] * share * (velocity - rate * normal)
+    force: Array = pressure(p, -rate, law[0], law[1], 0.0) * normal - law[2] * share * (
+        velocity - rate * normal
+    )
     return force
 
 
@@ -127,26 +123,13 @@ class Tissue(Disturbance):
 
     def modify(self, spec: mujoco.MjSpec) -> None:
         """Refuse a scene without an instrument."""
-        if all(body.name != "jaws" for body in spec.bodies):
-            raise SurgsimError("disturbance 'tissue' needs an instrument, and the scenario has none")
+        needs_instrument(spec, "disturbance 'tissue'")
 
     def attach(self, scene: Scene, dt_s: float) -> None:
         """Refuse a timestep that the tissue's law cannot be stepped with.
 
-        An explicit spring k with damping b on the mass m is stable for k h^2 + 2 b h < 4 m with timestep h; a
-        quarter of that is asked for.
-
         Raises:
             SurgsimError: With what the tip bears.
         """
-        h, lightest = float(scene.model.opt.timestep), LIGHTEST_TIP_KG
-        if bend_joints(scene):
-            of_shaft = lateral_masses(scene, piece_lengths(scene).sum(keepdims=True), h)
-            lightest = float(1.0 / (1.0 / lightest + 1.0 / of_shaft[0]))
         k, b = float(self.gains[LAW][0]), float(self.gains[LAW][1:].max())
-        if k * h**2 + b * h > lightest:
-            raise SurgsimError(
-                f"disturbance 'tissue': k h^2 + b h must be at most {lightest:.2g} kg with "
-                f"stiffness k {k:g} N/m, damping or drag b {b:g} N s/m and timestep_s h {h:g}, not "
-                f"{k * h**2 + b * h:.3g} kg"
-            )
+        check_step(scene, "disturbance 'tissue'", k, b, "damping_n_s_per_m or drag_n_s_per_m")

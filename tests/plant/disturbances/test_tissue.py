@@ -130,7 +130,7 @@ def test_what_cannot_be_stepped_or_has_no_tip_is_refused(scenario):
     stiff = "disturbances=[{type: tissue, stiffness_n_per_m: 20000.0, drag_n_s_per_m: 50.0}]"
     prepare(scenario(stiff))
     slow = ("simulation.timestep_s=0.004", "simulation.control_period_s=0.004")
-    with pytest.raises(SurgsimError, match=r"must be at most 0\.2 kg with stiffness k 20000 N/m"):
+    with pytest.raises(SurgsimError, match=r"must be at most 0\.2 kg with stiffness_n_per_m k 20000"):
         prepare(scenario(*slow, stiff))
     with pytest.raises(ScenarioError, match="normal must not be zero"):
         scenario("disturbances=[{type: tissue, normal: [0.0, 0.0, 0.0]}]")

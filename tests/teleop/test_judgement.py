@@ -1,0 +1,108 @@
+"""What speaks against a run, on made columns."""
+
+import numpy as np
+import pytest
+
+from surgsim.tasks.success import Success
+from surgsim.tasks.teleoperation_program import conducted
+from surgsim.teleop.judgement import (
+    drift,
+    end_speed,
+    ends,
+    excess_j,
+    faults,
+    force_fidelity,
+    toggles_per_s,
+    transmitted_impedance,
+)
+
+T = 0.001
+ROWS = 4000
+TIME = T * np.arange(ROWS)
+
+
+class Made(dict):
+    """Columns by name; those of three are blocks."""
+
+    def __len__(self):
+        return ROWS
+
+    def block(self, name):
+        return self[name]
+
+
+def run(**changes):
+    """A run at rest, with tanks and no contact."""
+    still, zero = np.zeros((ROWS, 3)), np.zeros(ROWS)
+    made = {
+        name: still for name in ("handle", "handle_velocity", "tip", "tip_ref", "tip_force", "master_force")
+    }
+    made |= {"t_s": TIME, "delivered": zero, "delivered_j": zero, "tank_account_residual_j": zero}
+    made |= {"tank_operator_j": zero + 0.2, "tank_remote_j": zero + 0.1}
+    return Made(made | changes)
+
+
+def along(values):
+    return np.column_stack((values, np.zeros((ROWS, 2))))
+
+
+def test_what_was_stored_may_be_delivered_and_no_more():
+    given = np.linspace(0.0, 0.35, ROWS)
+    assert excess_j(run(delivered_j=given)) == pytest.approx(0.05)
+    assert excess_j(run(delivered_j=given, tank_account_residual_j=np.full(ROWS, np.nan))) == pytest.approx(
+        0.35
+    )
+    assert faults(run(delivered_j=0.85 * given)) == []
+    assert faults(run(delivered_j=given)) == ["it was active: it delivered 50 mJ more than it had stored"]
+
+
+def test_how_it_ends():
+    assert ends(run()) == "rests"
+    assert ends(run(handle_velocity=along(0.05 * np.sin(30.0 * TIME)))) == "moves"
+    assert ends(run(handle_velocity=along(0.01 * np.exp(TIME) * np.sin(30.0 * TIME)))) == "grows"
+    contact = along(np.where((TIME > 2.0) & (np.arange(ROWS) % 50 < 25), 5.0, 0.0))
+    assert ends(run(tip_force=contact)) == "chatters"
+    assert toggles_per_s(run(tip_force=contact)) == pytest.approx(40.0, abs=1.0)
+    assert toggles_per_s(run()) == 0.0
+
+
+def test_the_end_s_speed_is_the_larger_of_handle_and_tip():
+    moved = run(tip=along(0.03 * TIME), handle_velocity=along(np.full(ROWS, 0.02)))
+    assert end_speed(moved) == pytest.approx(0.03)
+    assert drift(moved) == pytest.approx(0.03 * TIME[-1])
+
+
+def test_fidelity_is_the_correlation_at_the_delay():
+    force = np.sin(TIME) ** 2
+    late = np.roll(force, 150)
+    assert force_fidelity(run(tip_force=along(force), master_force=along(0.1 * late)), 0.15) > 0.999
+    assert force_fidelity(run(tip_force=along(force), master_force=along(1.0 - late)), 0.15) < -0.9
+    assert np.isnan(force_fidelity(run(), 0.15))
+
+
+def test_the_impedance_is_that_which_the_force_was_made_with():
+    x, v = 0.01 * np.sin(5.0 * TIME), 0.05 * np.cos(5.0 * TIME)
+    place = np.where(TIME < 2.0, 0.03, -0.02)
+    contact = np.where((TIME > 0.5) & (TIME < 1.5) | (TIME > 2.5), 3.0, 0.0)
+    contact[-1] = 0.0
+    made = run(
+        handle=along(x + place),
+        handle_velocity=along(v),
+        master_force=along(-70.0 * (x - 0.002) - 4.0 * v),
+        tip_force=along(contact),
+    )
+    assert transmitted_impedance(made, 0.15) == pytest.approx((70.0, 4.0))
+    assert np.isnan(transmitted_impedance(run(), 0.15)).all()
+
+
+def test_a_run_that_moves_on_has_not_done_its_task_though_its_goals_were_reached():
+    found = Success(done=True, reason="1 of 1 goals were reached")
+    moving = run(handle_velocity=along(np.full(ROWS, 0.1)))
+    assert conducted(found, run()) is found
+    assert conducted(found, moving) == Success(
+        done=False, reason="1 of 1 goals were reached; it moves at the end, at 100 mm/s"
+    )
+    person = Success(done=None, reason="a person operated, whose goals nobody counts")
+    assert conducted(person, moving) is person
+    without = Made({name: values for name, values in moving.items() if name != "delivered"})
+    assert conducted(found, without) is found
