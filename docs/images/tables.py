@@ -19,7 +19,7 @@ from ruamel.yaml import YAML
 ROOT = Path(__file__).resolve().parents[2]
 RESULTS = ROOT / "results" / "leaderboard"
 PAGES = (
-    "README.md",
+    "docs/results.md",
     "docs/robustness.md",
     "docs/drives.md",
     "docs/peg_and_ring.md",
@@ -129,21 +129,44 @@ def _theatre_short() -> str:
 
 
 def _over_arms(columns: Sequence[Column]) -> str:
-    names = dict.fromkeys(row["controller"] for row in rows_of("theatre"))
-    mine = {name: [row for row in rows_of("theatre") if row["controller"] == name] for name in names}
-    done = {name: [row for row in rows if row["outcome"] == "completed"] for name, rows in mine.items()}
+    head = ["controller", "completed", *(column.heading for column in columns)]
+    lines = [
+        [f"`{name}`", f"{len(done)} of {count}"]
+        + [f"{float(c.of([row[c.metric] for row in done])):.3g}" if done else "–" for c in columns]
+        for name, count, done in _theatre_order()
+    ]
+    return table(head, lines)
+
+
+def _theatre_order() -> list[tuple[str, int, Rows]]:
+    """Controllers of the theatre, number of runs, those that completed; best first, failed last."""
+    rows = rows_of("theatre")
+    names = dict.fromkeys(row["controller"] for row in rows)
+    mine = {name: [row for row in rows if row["controller"] == name] for name in names}
+    done = {name: [row for row in runs if row["outcome"] == "completed"] for name, runs in mine.items()}
 
     def order(name: str) -> tuple[float, str]:
         error = np.mean([row["rcm_error_rms_mm"] for row in done[name]]) if done[name] else np.inf
         return float(error), name
 
-    head = ["controller", "completed", *(column.heading for column in columns)]
-    lines = [
-        [f"`{name}`", f"{len(done[name])} of {len(mine[name])}"]
-        + [f"{float(c.of([r[c.metric] for r in done[name]])):.3g}" if done[name] else "–" for c in columns]
-        for name in sorted(names, key=order)
+    return [(name, len(mine[name]), done[name]) for name in sorted(names, key=order)]
+
+
+def theatre_errors() -> list[tuple[str, int, int, dict[str, list[float]]]]:
+    """Of each controller of the theatre, best first: name, runs completed, runs, RCM RMS by arm [mm]."""
+    arms = {"FR3": "fr3", "Panda": "panda", "iiwa14": "iiwa14", "LWR4+": "lwr4plus"}
+    return [
+        (
+            name,
+            len(done),
+            count,
+            {
+                title: [row["rcm_error_rms_mm"] for row in done if row["scenario"] == f"theatre_{arm}"]
+                for title, arm in arms.items()
+            },
+        )
+        for name, count, done in _theatre_order()
     ]
-    return table(head, lines)
 
 
 def _drives_arms() -> str:
