@@ -42,7 +42,7 @@ def _box(ax: Any, at: tuple[float, float], text: str, color: str) -> None:
 
 def rcm() -> Figure:
     """Side view: skin, trocar, shaft and both errors."""
-    drawing, ax = _canvas((7.5, 5.4), (-6.2, 7.6), (-6.2, 4.2))
+    drawing, ax = _canvas((6.2, 4.5), (-6.2, 7.6), (-6.2, 4.2))
     x = np.linspace(-6, 6, 100)
     skin = -0.012 * x**2
     ax.fill_between(x, skin, -6.2, color=ORANGE, alpha=0.15, lw=0)
@@ -76,7 +76,7 @@ def rcm() -> Figure:
 
 def tick() -> Figure:
     """One tick of control: who gives what to whom."""
-    drawing, ax = _canvas((9.0, 3.1), (-0.6, 14.6), (-2.9, 2.0))
+    drawing, ax = _canvas((6.6, 2.4), (-0.6, 14.6), (-3.1, 2.2))
     boxes = {
         0.6: ("task", BLUE),
         4.0: ("resolver", GREEN),
@@ -104,7 +104,7 @@ def tick() -> Figure:
 
 def drive() -> Figure:
     """A drive: torque loop, motor, gear as a spring, link."""
-    drawing, ax = _canvas((8.0, 2.3), (-1.0, 12.6), (-1.7, 1.9))
+    drawing, ax = _canvas((6.6, 2.1), (-1.2, 12.8), (-1.9, 2.1))
     for place, text, color in ((0.8, "torque\nloop", GREEN), (4.0, "motor", ORANGE), (10.6, "link", BLUE)):
         _box(ax, (place, 0), text, color)
     _arrow(ax, (1.9, 0), (3.0, 0))
@@ -121,7 +121,7 @@ def drive() -> Figure:
 
 def tank() -> Figure:
     """An energy tank: what flows in, what may flow out."""
-    drawing, ax = _canvas((7.5, 3.2), (-6.6, 6.8), (-2.4, 3.2))
+    drawing, ax = _canvas((6.6, 2.9), (-6.9, 7.2), (-2.4, 3.2))
     ax.fill_between([-1.5, 1.5], -1.8, 0.4, color=BLUE, alpha=0.3, lw=0)
     ax.plot([-1.5, -1.5, 1.5, 1.5], [2.0, -1.8, -1.8, 2.0], color=BLACK, lw=2.5)
     ax.plot([-1.5, 1.5], [-1.2, -1.2], "--", color=VERMILLION, lw=1.8)
@@ -144,7 +144,7 @@ def main() -> None:
     HERE.mkdir(exist_ok=True)
     for file, diagram in DIAGRAMS.items():
         path = HERE / file
-        diagram().savefig(path, dpi=110, metadata={"Software": None})
+        diagram().savefig(path, dpi=150, metadata={"Software": None})
         with Image.open(path) as image:
             image.load()
             save(image, path, stamp())

@@ -143,16 +143,15 @@ def draw_errors() -> None:
         path, "RCM error in the operating theatre, 20 seeds on each of four arms", size=(9.0, 3.6)
     ) as axes:
         ax = axes[0, 0]
-        for place, (_, done, count, errors) in enumerate(reversed(rows)):
+        for place, (_, ended, errors) in enumerate(reversed(rows)):
             for part, (arm, values) in enumerate(errors.items()):
                 height = place + 0.24 - 0.16 * part
                 label = arm if place == len(rows) - 1 else None
                 ax.plot(values, [height] * len(values), "o", color=colors[part], ms=4, alpha=0.6, label=label)
-            note = (
-                f"{done} of {count} completed" if done else "no run completed: it takes the gears for rigid"
-            )
             at = {"transform": ax.get_yaxis_transform(), "va": "center", "fontsize": 10}
-            ax.text(1.02 if done else 0.02, place, note, **at)
+            ax.text(1.02, place, ended, **at)
+            if not any(errors.values()):
+                ax.text(0.02, place, "no run completed: it takes the gears for rigid", **at)
         ax.set_yticks(range(len(rows)), [row[0] for row in reversed(rows)])
         ax.set(xscale="log", xlabel="RMS over the run [mm]", ylim=(-0.5, len(rows) - 0.5))
         legend_below(axes, len(colors))

@@ -129,9 +129,9 @@ def _theatre_short() -> str:
 
 
 def _over_arms(columns: Sequence[Column]) -> str:
-    head = ["controller", "completed", *(column.heading for column in columns)]
+    head = ["controller", "completed", "did the task", *(column.heading for column in columns)]
     lines = [
-        [f"`{name}`", f"{len(done)} of {count}"]
+        [f"`{name}`", f"{len(done)} of {count}", str(sum(row["success"] for row in done))]
         + [f"{float(c.of([row[c.metric] for row in done])):.3g}" if done else "–" for c in columns]
         for name, count, done in _theatre_order()
     ]
@@ -152,14 +152,13 @@ def _theatre_order() -> list[tuple[str, int, Rows]]:
     return [(name, len(mine[name]), done[name]) for name in sorted(names, key=order)]
 
 
-def theatre_errors() -> list[tuple[str, int, int, dict[str, list[float]]]]:
-    """Of each controller of the theatre, best first: name, runs completed, runs, RCM RMS by arm [mm]."""
+def theatre_errors() -> list[tuple[str, str, dict[str, list[float]]]]:
+    """Of each controller of the theatre, best first: name, how its runs ended, RCM RMS by arm [mm]."""
     arms = {"FR3": "fr3", "Panda": "panda", "iiwa14": "iiwa14", "LWR4+": "lwr4plus"}
     return [
         (
             name,
-            len(done),
-            count,
+            f"{len(done)} of {count} completed,\n{sum(row['success'] for row in done)} did the task",
             {
                 title: [row["rcm_error_rms_mm"] for row in done if row["scenario"] == f"theatre_{arm}"]
                 for title, arm in arms.items()
@@ -252,8 +251,26 @@ def _nominal() -> str:
 
 RCM = (("RCM RMS", "rcm_error_rms_mm"), ("RCM max", "rcm_error_max_mm"))
 FORCE = (("force RMS [N]", "trocar_force_rms_n"), ("max [N]", "trocar_force_max_n"))
+VERDICTS = ("holds", "depends", "does not hold", "not comparable")
+
+
+def _studies() -> str:
+    """How many claims of each study hold, counted in its page; the papers' and ours."""
+    lines = []
+    for page in sorted((ROOT / "results").glob("*/README.md")):
+        claims = re.findall(
+            r"^\| .+ \| (.+?) \| \*\*([a-z ]+)\*\* \| .* \|$", page.read_text(encoding="utf-8"), re.M
+        )
+        for kind in ("the paper's", "ours") if claims else ():
+            mine = [verdict for by, verdict in claims if (by == "surgsim") == (kind == "ours")]
+            counts = [str(mine.count(verdict)) for verdict in VERDICTS]
+            lines.append([f"[{page.parent.name}](../results/{page.parent.name}/README.md)", kind, *counts])
+    return table(["study", "claims", *VERDICTS], lines)
+
+
 TABLES: dict[str, Callable[[], str]] = {
     "nominal": _nominal,
+    "studies": _studies,
     "theatre_short": _theatre_short,
     "drives_arms": _drives_arms,
     "drives_levels": _drives_levels,
