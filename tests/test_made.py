@@ -74,9 +74,10 @@ def test_the_pictures_are_those_of_the_current_scenes(made, file):
     assert stamped(draw.HERE / file) == draw.scene_stamp(*draw.SCENES[file]), AGAIN
 
 
-def test_the_moving_picture_is_of_the_current_scene(made):
+def test_the_moving_pictures_are_of_the_current_scenes(made):
     draw, _ = made
-    assert draw.moving_stamp().encode() in (draw.HERE / "theatre.gif").read_bytes(), AGAIN
+    for file in draw.MOVING:
+        assert draw.moving_stamp(file).encode() in (draw.HERE / file).read_bytes(), AGAIN
 
 
 def test_the_picture_of_the_theatres_errors_is_that_of_the_results(made):

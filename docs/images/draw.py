@@ -34,8 +34,11 @@ SCENES = {
     "fr3.png": ("circle_fr3", "overview"),
     "iiwa14.png": ("circle_iiwa14", "overview"),
 }
-MOVING = ("theatre_panda", "rcm_elastic_dynamics")
-"""Scenario and controller of the moving picture."""
+MOVING = {
+    "theatre.gif": ("theatre_panda", "rcm_elastic_dynamics", "overview,inside", "2"),
+    "rings.gif": ("peg_and_ring_panda", "passive_convex", "inside,endoscope", "8"),
+}
+"""Scenario, controller, cameras and speed of each moving picture."""
 PATHS = ("circle", "sinusoid", "spiral")
 ARMS = {"lwr4plus": BLUE, "panda": VERMILLION}
 _POINTS = 400
@@ -73,10 +76,10 @@ def _rounded(values: np.ndarray) -> str:
     return json.dumps((np.round(values, 4) + 0.0).tolist())
 
 
-def moving_stamp() -> str:
-    """What the moving picture is made from: the scene as two cameras see it, and the controller's name."""
-    name, controller = MOVING
-    return digest([controller, *(scene_stamp(name, camera) for camera in ("overview", "inside"))])
+def moving_stamp(file: str) -> str:
+    """What a moving picture is made from: the scene, the controller's name, the cameras, the speed."""
+    name, *others = MOVING[file]
+    return digest([*others, scene_stamp(name, "overview")])
 
 
 def errors_stamp() -> str:
@@ -96,36 +99,19 @@ def draw_scene(file: str) -> None:
     save(Image.fromarray(pixels), HERE / file, scene_stamp(name, camera))
 
 
-def draw_moving() -> None:
-    """Draw the moving picture: a run, from outside and from inside, twice as fast as it was.
+def draw_moving(file: str) -> None:
+    """Draw a moving picture.
 
     Raises:
         subprocess.CalledProcessError: If the run fails, or this machine cannot draw.
     """
-    name, controller = MOVING
-    path = HERE / "theatre.gif"
+    name, controller, cameras, speed = MOVING[file]
+    path = HERE / file
     with tempfile.TemporaryDirectory() as folder:
-        _surgsim(
-            "run",
-            name,
-            "--controller",
-            controller,
-            "--out",
-            f"{folder}/run",
-        )
-        options = (
-            "--camera",
-            "overview,inside",
-            "--speed",
-            "2",
-            "--fps",
-            "8",
-            "--size",
-            "480x480",
-            "--force",
-        )
-        _surgsim("export", f"{folder}/run", "--video", str(path), *options)
-    stamp = moving_stamp().encode()
+        _surgsim("run", name, "--controller", controller, "--out", f"{folder}/run")
+        options = ("--camera", cameras, "--speed", speed, "--fps", "8", "--size", "480x480")
+        _surgsim("export", f"{folder}/run", "--video", str(path), "--force", *options)
+    stamp = moving_stamp(file).encode()
     remark = b"\x21\xfe" + bytes([len(stamp)]) + stamp + b"\x00"
     path.write_bytes(path.read_bytes().removesuffix(b";") + remark + b";")  # a GIF ends with a semicolon
 
@@ -192,7 +178,8 @@ def main() -> int:
     try:
         for file in SCENES:
             draw_scene(file)
-        draw_moving()
+        for file in MOVING:
+            draw_moving(file)
     except (SurgsimError, subprocess.CalledProcessError) as error:
         print(error, file=sys.stderr)
         return 1

@@ -72,7 +72,9 @@ GROUPS = (
         starts=("teleop_", "peg_and_ring_"),
         text="An operator at a console, a delayed channel, energy tanks: [teleoperation](teleoperation.md), "
         "[peg and ring](peg_and_ring.md).",
-        pictures={},
+        pictures={
+            "rings.gif": "Three rings go from peg to peg, eight times as fast; below, the endoscope's view"
+        },
     ),
     Group(
         title="Drawn by the seed",
