@@ -4,7 +4,7 @@ ROOT := $(patsubst %/,%,$(dir $(abspath $(lastword $(MAKEFILE_LIST)))))
 VENV := $(ROOT)/.venv
 PY := $(VENV)/bin/python
 PYTHON ?= $(shell command -v python3.11 || command -v python3)
-EXTRAS := dev,gymnasium,pandas,ray,bench,video
+EXTRAS := dev,docs,gymnasium,pandas,ray,bench,video
 RUN := runs/circle_lwr4plus/vprnn-seed0
 # Each process of the tests begins at its own half and takes from the other's end when it is through: so tests of one
 # file, which share what they make first, and the kernels that they compile, stay together.
@@ -14,6 +14,7 @@ TWO_AT_ONCE := -n 2 --dist worksteal
 STATE := $(shell { echo '$(ROOT)'; cat '$(ROOT)/pyproject.toml' '$(ROOT)/constraints.txt'; } | cksum | tr ' ' '-')
 INSTALLED := $(VENV)/.surgsim-$(STATE)
 INSTALLED_DEV := $(VENV)/.surgsim-dev-$(STATE)
+INSTALLED_DOCS := $(VENV)/.surgsim-docs-$(STATE)
 INSTALLED_ALL := $(VENV)/.surgsim-all-$(STATE)
 PIP_INSTALL := "$(PY)" -m pip install --disable-pip-version-check -c "$(ROOT)/constraints.txt"
 # pip says nothing while it unpacks: every ten seconds a line tells how much is there.
@@ -23,7 +24,7 @@ OLD_ENOUGH := import sys; v = sys.version_info; sys.exit(0 if v >= (3, 11) else 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
 .NOTPARALLEL:
-.PHONY: help install install-dev install-all run test test-all check bench pictures wheel clean
+.PHONY: help install install-dev install-all run test test-all check bench pictures docs wheel clean
 
 help:  ## list the targets
 	@sed -n 's/^\([a-z-]*\):.*  ## \(.*\)/\1|\2/p' '$(ROOT)/Makefile' | awk -F'|' '{ printf "%-12s %s\n", $$1, $$2 }'
@@ -58,6 +59,10 @@ bench: $(INSTALLED)  ## measure the speed on this machine
 pictures: $(INSTALLED_DEV)  ## make pictures, tables and leaderboard pages of the documents again; needs OpenGL, and Vulkan for the viewer
 	@cd '$(ROOT)' && "$(PY)" docs/images/draw.py && "$(PY)" docs/images/viewer.py
 
+docs: $(INSTALLED_DOCS)  ## build the documentation site into build/site; a warning is an error
+	@cd '$(ROOT)' && "$(PY)" -m sphinx --quiet --fail-on-warning --keep-going --conf-dir docs . build/site
+	@echo 'open $(ROOT)/build/site/index.html'
+
 wheel: $(INSTALLED_DEV)  ## build the wheel into dist/
 	@cd '$(ROOT)' && "$(PY)" -m pip wheel --quiet --no-build-isolation --no-deps --wheel-dir dist .
 	@ls -l '$(ROOT)'/dist/*.whl
@@ -84,9 +89,13 @@ $(INSTALLED_DEV): | $(PY)
 	$(call install,$(ROOT)[dev])
 	@touch '$(INSTALLED)' '$(INSTALLED_DEV)'
 
+$(INSTALLED_DOCS): | $(PY)
+	$(call install,$(ROOT)[docs])
+	@touch '$(INSTALLED)' '$(INSTALLED_DOCS)'
+
 $(INSTALLED_ALL): | $(PY)
 	$(call install,$(ROOT)[$(EXTRAS)])
-	@touch '$(INSTALLED)' '$(INSTALLED_DEV)' '$(INSTALLED_ALL)'
+	@touch '$(INSTALLED)' '$(INSTALLED_DEV)' '$(INSTALLED_DOCS)' '$(INSTALLED_ALL)'
 
 $(PY):
 	@test -n '$(PYTHON)' || { echo 'surgsim needs Python 3.11 or newer, and none was found. Set PYTHON=/path/to/python3.11' >&2; exit 1; }

@@ -8,6 +8,8 @@ from pathlib import Path
 import pyarrow.parquet as pq
 import pytest
 
+from surgsim.scenario.load import shipped
+
 ROOT = Path(__file__).resolve().parents[1]
 AGAIN = "run `make pictures`"
 
@@ -22,6 +24,11 @@ def made():
         sys.path.pop(0)
 
 
+def stamped(path):
+    """What a picture says that it was made from."""
+    return importlib.import_module("stamps").stamped(path)
+
+
 def test_the_tables_of_the_documents_are_those_of_the_results(made):
     _, tables = made
     found = set()
@@ -34,7 +41,7 @@ def test_the_tables_of_the_documents_are_those_of_the_results(made):
 
 def test_a_wrong_figure_in_a_table_is_found(made):
     _, tables = made
-    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    text = (ROOT / "docs" / "results.md").read_text(encoding="utf-8")
     figure = re.search(r"<!-- table theatre_short -->.*?\| (0\.\d+) \|", text, re.DOTALL)
     assert figure
     wrong = text.replace(f"| {figure[1]} |", f"| {figure[1]}9 |")
@@ -52,8 +59,8 @@ def test_the_reference_runs_are_as_many_as_their_page_says():
     assert told == held
 
 
-def test_what_the_readme_says_of_our_controller_holds_in_the_rows():
-    text = (ROOT / "README.md").read_text(encoding="utf-8")
+def test_what_the_results_say_of_our_controller_holds_in_the_rows():
+    text = (ROOT / "docs" / "results.md").read_text(encoding="utf-8")
     said = re.search(r"same LWR4\+ scenarios: tip RMS at most ([\d.]+) mm, RCM max at most ([\d.]+) mm", text)
     rows = pq.read_table(ROOT / "results/leaderboard/nominal/runs.parquet").to_pylist()
     ours = [r for r in rows if r["controller"] == "rcm_inverse_dynamics" and "lwr4plus" in r["scenario"]]
@@ -64,12 +71,36 @@ def test_what_the_readme_says_of_our_controller_holds_in_the_rows():
 @pytest.mark.parametrize("file", ["theatre.png", "port_closeup.png", "panda.png", "fr3.png", "iiwa14.png"])
 def test_the_pictures_are_those_of_the_current_scenes(made, file):
     draw, _ = made
-    assert draw.stamped(draw.HERE / file) == draw.scene_stamp(*draw.SCENES[file]), AGAIN
+    assert stamped(draw.HERE / file) == draw.scene_stamp(*draw.SCENES[file]), AGAIN
+
+
+def test_the_moving_pictures_are_of_the_current_scenes(made):
+    draw, _ = made
+    for file in draw.MOVING:
+        assert draw.moving_stamp(file).encode() in (draw.HERE / file).read_bytes(), AGAIN
+
+
+def test_the_picture_of_the_theatres_errors_is_that_of_the_results(made):
+    draw, _ = made
+    assert stamped(draw.HERE / "theatre_errors.png") == draw.errors_stamp(), AGAIN
+
+
+def test_the_diagrams_are_those_of_their_script(made):
+    concepts = importlib.import_module("concepts")
+    for file in concepts.DIAGRAMS:
+        assert stamped(concepts.HERE / file) == concepts.stamp(), AGAIN
+
+
+def test_the_gallery_shows_the_current_scenarios(made):
+    gallery = importlib.import_module("gallery")
+    text = gallery.PAGE.read_text(encoding="utf-8")
+    assert text == gallery.page(), AGAIN
+    assert [name for name in shipped() if f"surgsim run {name}" not in text] == []
 
 
 def test_the_picture_of_the_paths_is_that_of_the_current_paths(made):
     draw, _ = made
-    assert draw.stamped(draw.HERE / "paths.png") == draw.paths_stamp(), AGAIN
+    assert stamped(draw.HERE / "paths.png") == draw.paths_stamp(), AGAIN
 
 
 @pytest.mark.parametrize(

@@ -20,6 +20,7 @@ def test_the_citation_holds_what_its_format_requires_and_names_this_version():
     assert citation["type"] == "software"
     assert all(author.get("name") or author.get("family-names") for author in citation["authors"])
     assert (citation["version"], citation["license"]) == (surgsim.__version__, PROJECT["license"])
+    assert f"version = {{{surgsim.__version__}}}" in (ROOT / "README.md").read_text(encoding="utf-8")
 
 
 def test_the_changelog_has_the_form_of_keep_a_changelog():

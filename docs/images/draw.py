@@ -6,14 +6,17 @@ a stamp of what it was made from, and `tests/test_made.py` compares that with wh
 
 import hashlib
 import json
+import subprocess
 import sys
-from collections.abc import Iterable
+import tempfile
 from pathlib import Path
 
+import concepts
+import gallery
 import numpy as np
 import tables
 from PIL import Image
-from PIL.PngImagePlugin import PngInfo
+from stamps import digest, save
 
 from surgsim.errors import SurgsimError
 from surgsim.models.build import build
@@ -21,7 +24,7 @@ from surgsim.models.picture import render
 from surgsim.report.write import write_report
 from surgsim.scenario.load import load_scenario
 from surgsim.simulate.setup import Setup, prepare
-from surgsim.studies.figure import BLUE, VERMILLION, figure, legend_below
+from surgsim.studies.figure import BLUE, GREEN, ORANGE, PURPLE, VERMILLION, figure, legend_below
 
 HERE = Path(__file__).parent
 SCENES = {
@@ -31,9 +34,13 @@ SCENES = {
     "fr3.png": ("circle_fr3", "overview"),
     "iiwa14.png": ("circle_iiwa14", "overview"),
 }
+MOVING = {
+    "theatre.gif": ("theatre_panda", "rcm_elastic_dynamics", "overview,inside", "2"),
+    "rings.gif": ("peg_and_ring_panda", "passive_convex", "inside,endoscope", "8"),
+}
+"""Scenario, controller, cameras and speed of each moving picture."""
 PATHS = ("circle", "sinusoid", "spiral")
 ARMS = {"lwr4plus": BLUE, "panda": VERMILLION}
-STAMP = "surgsim"
 _POINTS = 400
 
 
@@ -42,12 +49,12 @@ def scene_stamp(name: str, camera: str) -> str:
     setup = prepare(load_scenario(name))
     told = [setup.scenario.scene.model_dump_json(), camera, _rounded(setup.q_start)]
     assets = sorted(path for path in (tables.ROOT / "assets").rglob("*") if path.is_file())
-    return _digest([*told, *(hashlib.sha256(path.read_bytes()).hexdigest() for path in assets)])
+    return digest([*told, *(hashlib.sha256(path.read_bytes()).hexdigest() for path in assets)])
 
 
 def paths_stamp() -> str:
     """What the picture of the paths is made from."""
-    return _digest(_rounded(path_from_port(name)) for name in path_names())
+    return digest(_rounded(path_from_port(name)) for name in path_names())
 
 
 def path_names() -> list[str]:
@@ -69,21 +76,15 @@ def _rounded(values: np.ndarray) -> str:
     return json.dumps((np.round(values, 4) + 0.0).tolist())
 
 
-def _digest(parts: Iterable[str]) -> str:
-    return hashlib.sha256("\n".join(parts).encode()).hexdigest()
+def moving_stamp(file: str) -> str:
+    """What a moving picture is made from: the scene, the controller's name, the cameras, the speed."""
+    name, *others = MOVING[file]
+    return digest([*others, scene_stamp(name, "overview")])
 
 
-def stamped(path: Path) -> str:
-    """The stamp that a picture carries; empty without one."""
-    with Image.open(path) as image:
-        return str(image.info.get(STAMP, ""))
-
-
-def _save(image: Image.Image, path: Path, stamp: str) -> None:
-    about = PngInfo()
-    about.add_text(STAMP, stamp)
-    image.save(path, optimize=True, pnginfo=about)
-    print(path)
+def errors_stamp() -> str:
+    """What the picture of the theatre's errors is made from."""
+    return digest(json.dumps(row) for row in tables.theatre_errors())
 
 
 def draw_scene(file: str) -> None:
@@ -95,7 +96,54 @@ def draw_scene(file: str) -> None:
     name, camera = SCENES[file]
     setup = prepare(load_scenario(name))
     pixels = render(build(setup.scenario.scene), setup.q_start, camera)
-    _save(Image.fromarray(pixels), HERE / file, scene_stamp(name, camera))
+    save(Image.fromarray(pixels), HERE / file, scene_stamp(name, camera))
+
+
+def draw_moving(file: str) -> None:
+    """Draw a moving picture.
+
+    Raises:
+        subprocess.CalledProcessError: If the run fails, or this machine cannot draw.
+    """
+    name, controller, cameras, speed = MOVING[file]
+    path = HERE / file
+    with tempfile.TemporaryDirectory() as folder:
+        _surgsim("run", name, "--controller", controller, "--out", f"{folder}/run")
+        options = ("--camera", cameras, "--speed", speed, "--fps", "8", "--size", "480x480")
+        _surgsim("export", f"{folder}/run", "--video", str(path), "--force", *options)
+    stamp = moving_stamp(file).encode()
+    remark = b"\x21\xfe" + bytes([len(stamp)]) + stamp + b"\x00"
+    path.write_bytes(path.read_bytes().removesuffix(b";") + remark + b";")  # a GIF ends with a semicolon
+
+
+def _surgsim(*words: str) -> None:
+    subprocess.run([sys.executable, "-m", "surgsim", *words], cwd=tables.ROOT, check=True)
+
+
+def draw_errors() -> None:
+    """Draw the RCM error of every run of the theatre: what real drives leave of the controllers."""
+    path = HERE / "theatre_errors.png"
+    rows = tables.theatre_errors()
+    colors = (BLUE, GREEN, PURPLE, ORANGE)
+    with figure(
+        path, "RCM error in the operating theatre, 20 seeds on each of four arms", size=(9.0, 3.6)
+    ) as axes:
+        ax = axes[0, 0]
+        for place, (_, ended, errors) in enumerate(reversed(rows)):
+            for part, (arm, values) in enumerate(errors.items()):
+                height = place + 0.24 - 0.16 * part
+                label = arm if place == len(rows) - 1 else None
+                ax.plot(values, [height] * len(values), "o", color=colors[part], ms=4, alpha=0.6, label=label)
+            at = {"transform": ax.get_yaxis_transform(), "va": "center", "fontsize": 10}
+            ax.text(1.02, place, ended, **at)
+            if not any(errors.values()):
+                ax.text(0.02, place, "no run completed: it takes the gears for rigid", **at)
+        ax.set_yticks(range(len(rows)), [row[0] for row in reversed(rows)])
+        ax.set(xscale="log", xlabel="RMS over the run [mm]", ylim=(-0.5, len(rows) - 0.5))
+        legend_below(axes, len(colors))
+    with Image.open(path) as image:
+        image.load()
+        save(image, path, errors_stamp())
 
 
 def draw_paths() -> None:
@@ -115,19 +163,24 @@ def draw_paths() -> None:
         legend_below(axes, len(ARMS))
     with Image.open(path) as image:
         image.load()
-        _save(image, path, paths_stamp())
+        save(image, path, paths_stamp())
 
 
 def main() -> int:
     """Make everything; 1 if the scenes could not be drawn."""
     tables.main()
+    gallery.main()
     draw_paths()
+    draw_errors()
+    concepts.main()
     for folder in sorted(path.parent for path in tables.RESULTS.glob("*/runs.parquet")):
         print(write_report(folder))
     try:
         for file in SCENES:
             draw_scene(file)
-    except SurgsimError as error:
+        for file in MOVING:
+            draw_moving(file)
+    except (SurgsimError, subprocess.CalledProcessError) as error:
         print(error, file=sys.stderr)
         return 1
     return 0

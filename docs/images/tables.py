@@ -19,7 +19,7 @@ from ruamel.yaml import YAML
 ROOT = Path(__file__).resolve().parents[2]
 RESULTS = ROOT / "results" / "leaderboard"
 PAGES = (
-    "README.md",
+    "docs/results.md",
     "docs/robustness.md",
     "docs/drives.md",
     "docs/baselines.md",
@@ -130,21 +130,43 @@ def _theatre_short() -> str:
 
 
 def _over_arms(columns: Sequence[Column]) -> str:
-    names = dict.fromkeys(row["controller"] for row in rows_of("theatre"))
-    mine = {name: [row for row in rows_of("theatre") if row["controller"] == name] for name in names}
-    done = {name: [row for row in rows if row["outcome"] == "completed"] for name, rows in mine.items()}
+    head = ["controller", "completed", "did the task", *(column.heading for column in columns)]
+    lines = [
+        [f"`{name}`", f"{len(done)} of {count}", str(sum(row["success"] for row in done))]
+        + [f"{float(c.of([row[c.metric] for row in done])):.3g}" if done else "–" for c in columns]
+        for name, count, done in _theatre_order()
+    ]
+    return table(head, lines)
+
+
+def _theatre_order() -> list[tuple[str, int, Rows]]:
+    """Controllers of the theatre, number of runs, those that completed; best first, failed last."""
+    rows = rows_of("theatre")
+    names = dict.fromkeys(row["controller"] for row in rows)
+    mine = {name: [row for row in rows if row["controller"] == name] for name in names}
+    done = {name: [row for row in runs if row["outcome"] == "completed"] for name, runs in mine.items()}
 
     def order(name: str) -> tuple[float, str]:
         error = np.mean([row["rcm_error_rms_mm"] for row in done[name]]) if done[name] else np.inf
         return float(error), name
 
-    head = ["controller", "completed", *(column.heading for column in columns)]
-    lines = [
-        [f"`{name}`", f"{len(done[name])} of {len(mine[name])}"]
-        + [f"{float(c.of([r[c.metric] for r in done[name]])):.3g}" if done[name] else "–" for c in columns]
-        for name in sorted(names, key=order)
+    return [(name, len(mine[name]), done[name]) for name in sorted(names, key=order)]
+
+
+def theatre_errors() -> list[tuple[str, str, dict[str, list[float]]]]:
+    """Of each controller of the theatre, best first: name, how its runs ended, RCM RMS by arm [mm]."""
+    arms = {"FR3": "fr3", "Panda": "panda", "iiwa14": "iiwa14", "LWR4+": "lwr4plus"}
+    return [
+        (
+            name,
+            f"{len(done)} of {count} completed,\n{sum(row['success'] for row in done)} did the task",
+            {
+                title: [row["rcm_error_rms_mm"] for row in done if row["scenario"] == f"theatre_{arm}"]
+                for title, arm in arms.items()
+            },
+        )
+        for name, count, done in _theatre_order()
     ]
-    return table(head, lines)
 
 
 def _drives_arms() -> str:
@@ -266,8 +288,26 @@ def _nominal() -> str:
 
 RCM = (("RCM RMS", "rcm_error_rms_mm"), ("RCM max", "rcm_error_max_mm"))
 FORCE = (("force RMS [N]", "trocar_force_rms_n"), ("max [N]", "trocar_force_max_n"))
+VERDICTS = ("holds", "depends", "does not hold", "not comparable")
+
+
+def _studies() -> str:
+    """How many claims of each study hold, counted in its page; the papers' and ours."""
+    lines = []
+    for page in sorted((ROOT / "results").glob("*/README.md")):
+        claims = re.findall(
+            r"^\| .+ \| (.+?) \| \*\*([a-z ]+)\*\* \| .* \|$", page.read_text(encoding="utf-8"), re.M
+        )
+        for kind in ("the paper's", "ours") if claims else ():
+            mine = [verdict for by, verdict in claims if (by == "surgsim") == (kind == "ours")]
+            counts = [str(mine.count(verdict)) for verdict in VERDICTS]
+            lines.append([f"[{page.parent.name}](../results/{page.parent.name}/README.md)", kind, *counts])
+    return table(["study", "claims", *VERDICTS], lines)
+
+
 TABLES: dict[str, Callable[[], str]] = {
     "nominal": _nominal,
+    "studies": _studies,
     "theatre_short": _theatre_short,
     "baselines": _baselines,
     "drives_arms": _drives_arms,

@@ -47,7 +47,8 @@ def compare(
     """Run a suite, or scenarios with several controllers and seeds, and compare them.
 
     Args:
-        what: A suite, by name or path; or one scenario or several: names, paths, mappings or `Scenario`s.
+        what: A suite, by name or path; or one scenario or several, each a name, a path, a mapping or a
+            `Scenario`.
         controllers: Controllers instead of the suite's, or of the scenarios' own: names, paths or mappings.
         seeds: Seeds instead of the suite's: an integer, several of them, or text such as `"0:10"`.
         settings: Values by key path for every run, as `--set` of the command.

@@ -47,7 +47,7 @@ def run(
         **blocks: Values by a scenario's top-level key, see `surgsim.load`.
 
     Returns:
-        The run, also one that a limit stopped: see its `outcome`.
+        The run, also one that a limit stopped; its `outcome` tells.
 
     Raises:
         SurgsimError: If the scenario is not valid or cannot be started, or the folder cannot be written.

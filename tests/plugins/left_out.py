@@ -55,6 +55,9 @@ PARTS = {
     "video": Part(
         "video", lambda: importlib.util.find_spec("av") is not None, "pip install 'surgsim[video]'"
     ),
+    "sphinx": Part(
+        "site", lambda: importlib.util.find_spec("myst_nb") is not None, "pip install 'surgsim[docs]'"
+    ),
     "opengl": Part("drawing", _draws, "neither EGL nor OSMesa"),
     "display": Part("window", lambda: shutil.which("Xvfb") is not None, "no Xvfb on the PATH"),
     "compiler": Part("C", lambda: shutil.which("cc") is not None, "no C compiler on the PATH"),
