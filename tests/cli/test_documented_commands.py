@@ -62,7 +62,7 @@ SHORTER = {
     "surgsim compare circle_lwr4plus --controllers vprnn,pinv --set task.radius_m=0.01 "
     "--out runs/small_circle": SHORT,
     "surgsim compare theatre --out runs/theatre": f"{SHORT} --controllers joint_elastic_dynamics --seeds 0:1",
-    "surgsim compare baselines --out runs/baselines": f"{SHORT} --controllers rcm_elastic_dynamics --seeds 0:2",
+    "surgsim compare baselines --out runs/baselines": f"{SHORT} --controllers rcm_elastic_dynamics --seeds 0",
     "surgsim compare theatre_ideal --out runs/theatre_ideal": f"{SHORT} --controllers vprnn --seeds 0:2",
     "surgsim compare drives --out runs/drives": "--controllers joint_elastic_dynamics --seeds 0:1",
     "surgsim compare breathing_tracked --out runs/breathing_tracked": f"{SHORT} --controllers vprnn",
