@@ -51,7 +51,8 @@ def test_every_outcome_but_completion_has_a_scenario_of_its_name():
 @pytest.mark.parametrize("name", sorted(NAMES))
 def test_its_scenario_ends_in_it_on_the_command_line_and_the_recording_says_so(name, tmp_path, capsys):
     words = ["run", f"safety/{name}", "--json", "--out", str(tmp_path / "run"), "--set", "theatre=false"]
-    words += ["--external", f"mine={outside.command('ends', 500)}"]
+    if name == "external_failed":
+        words += ["--external", f"mine={outside.command('ends', 500)}"]
     assert main(words) == 1
     printed = json.loads(capsys.readouterr().out)
     assert printed["outcome"]["name"] == name
