@@ -13,7 +13,7 @@ WHOLE = ("theatre_lwr4plus", "theatre_ideal_lwr4plus", "teleop_free_motion_panda
 KINEMATIC = ("pinv", "gradient", "vprnn", "qp")
 """Controllers that are measured on the kinematic plant too."""
 _WALL, _SENSOR = "trocar.wall={}", "disturbances=[{type: force_torque_sensor}]"
-_NEEDS = {
+NEEDS = {
     "rcm_interaction_force": (_WALL,),
     "rcm_port_admittance": (_WALL, _SENSOR),
     "hands_on_admittance": (_SENSOR,),
@@ -46,7 +46,7 @@ class Case:
 
 def circle(controller: str) -> Case:
     """The circle with a shipped controller."""
-    settings = _NEEDS.get(controller, ())
+    settings = NEEDS.get(controller, ())
     return Case(name=f"circle/{controller}", source=CIRCLE, controller=controller, settings=settings)
 
 

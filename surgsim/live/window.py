@@ -1,6 +1,5 @@
 """MuJoCo's passive viewer as the operator's screen."""
 
-import os
 import sys
 import threading
 import time
@@ -16,6 +15,7 @@ from surgsim.live.keyboard import Keyboard
 from surgsim.live.picture import Picture, screen_axes
 from surgsim.live.status import Status
 from surgsim.plant.truth import Truth
+from surgsim.recording.view import display
 from surgsim.simulate.setup import Setup
 
 Array = NDArray[np.float64]
@@ -29,8 +29,7 @@ def check_display() -> None:
     Raises:
         SurgsimError: If no window can be opened here.
     """
-    display = os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
-    if sys.platform == "linux" and not display:
+    if not display():
         raise SurgsimError("operating needs a display, and this session has none")
     if sys.platform == "darwin":
         raise SurgsimError(
@@ -46,7 +45,7 @@ def check_display() -> None:
             window = glfw.create_window(64, 64, "surgsim", None, None)
             glfw.terminate()
     if not window:
-        raise SurgsimError(f"operating needs a window with OpenGL, which display '{display}' does not give")
+        raise SurgsimError(f"operating needs a window with OpenGL, which display '{display()}' does not give")
 
 
 class Window:

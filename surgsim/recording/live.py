@@ -1,8 +1,6 @@
 """A run in the viewer while it goes on: the entities of its recording, sent piece by piece."""
 
-import os
 import socket
-import sys
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 
@@ -14,6 +12,7 @@ from surgsim.recording.blueprint import blueprint
 from surgsim.recording.layout import APPLICATION
 from surgsim.recording.scene import log_paths, log_points, log_poses, log_shapes, rebuild, sampled_rows
 from surgsim.recording.signals import log_signals
+from surgsim.recording.view import display
 from surgsim.recording.write import log_texts, recording_name
 from surgsim.scenario.schema import Scenario
 from surgsim.trace.trace import Array, Trace
@@ -76,7 +75,11 @@ def viewer(address: str | None) -> Iterator[rr.RecordingStream]:
     stream = rr.RecordingStream(APPLICATION, send_properties=False)
     try:
         if address is None:
-            _check_display()
+            if not display():
+                raise SurgsimError(
+                    "--live opens a window, and this session has no display; start a viewer elsewhere "
+                    "(`rerun`), and give its address: --live HOST:9876"
+                )
             stream.spawn()
         else:
             _check_somebody(address)
@@ -84,14 +87,6 @@ def viewer(address: str | None) -> Iterator[rr.RecordingStream]:
         yield stream
     finally:
         stream.disconnect()
-
-
-def _check_display() -> None:
-    if sys.platform == "linux" and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
-        raise SurgsimError(
-            "--live opens a window, and this session has no display; start a viewer elsewhere (`rerun`), and "
-            "give its address: --live HOST:9876"
-        )
 
 
 def _check_somebody(address: str) -> None:

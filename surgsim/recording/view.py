@@ -20,6 +20,12 @@ _RERUN = (sys.executable, "-P", "-c", "import sys; from rerun_cli.__main__ impor
 _START_TIMEOUT_S = 60.0
 
 
+def display() -> str:
+    """Where windows open; empty where there is no such place, which shows on Linux alone."""
+    named = os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY") or ""
+    return named if sys.platform == "linux" else named or "screen"
+
+
 def view(path: Path) -> None:
     """Open the native viewer on a recording or a run's folder, until its window is closed.
 
@@ -28,7 +34,7 @@ def view(path: Path) -> None:
         SurgsimError: If the viewer cannot be opened.
     """
     file = _checked(path)
-    if sys.platform == "linux" and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
+    if not display():
         raise SurgsimError("the viewer needs a display, and this session has none; --web serves a browser")
     command = [*_RERUN, str(file), "--port", "auto", "--bind", _HOST]
     try:

@@ -7,8 +7,8 @@ import subprocess
 import sys
 
 import pytest
-from shipped_controllers import NEEDS
 
+from surgsim.bench.cases import NEEDS
 from surgsim.cli.list import KINDS
 from surgsim.cli.main import COMMANDS, main
 from surgsim.scenario.load import load_scenario, shipped

@@ -6,8 +6,8 @@ import mujoco
 import numpy as np
 import pytest
 from published_arms import GRAVITY_M_PER_S2, PUBLISHED, PublishedArm, slope
-from shipped_controllers import NEEDS
 
+from surgsim.bench.cases import NEEDS
 from surgsim.models.build import GRAVITY_M_PER_S2 as OURS
 from surgsim.models.build import Scene, build_arm
 from surgsim.models.config import RobotConfig, SceneConfig

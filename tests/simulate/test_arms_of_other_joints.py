@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from shipped_controllers import NEEDS
 
+from surgsim.bench.cases import NEEDS
 from surgsim.control.rcm import rcm_kinematics
 from surgsim.control.resolvers import RESOLVERS
 from surgsim.env.environment import load as load_environment

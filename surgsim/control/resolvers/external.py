@@ -5,12 +5,10 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from surgsim.catalog import Name, PartConfig
 from surgsim.compiled import compiled
-from surgsim.control.external.config import StartTimeout, Timeout
+from surgsim.control.external.config import ExternalPartConfig
 from surgsim.control.external.exchange import exchange
 from surgsim.control.external.layout import JOINT_VELOCITY
-from surgsim.control.external.outside import Outside
 from surgsim.control.resolvers.base import KernelResolver
 from surgsim.control.resolvers.rows import answer, fill_task_rows
 from surgsim.models.arm import ArmModel
@@ -22,21 +20,15 @@ from surgsim.tick.status import EXTERNAL, GOES_ON
 Array = NDArray[np.float64]
 
 
-class ExternalConfig(PartConfig):
+class ExternalConfig(ExternalPartConfig):
     """Asks a controller outside surgsim, a process or a C function, for the joint velocities.
 
     Attributes:
-        name: The controller: its command is given by `--external NAME=COMMAND`, or by the user's own file.
         gives: What it answers.
-        timeout_s: How long a process may take for an answer [s].
-        start_timeout_s: How long it may take to start [s].
     """
 
     type: Literal["external"] = "external"
-    name: Name = "mine"
     gives: Literal["joint_velocity"] = "joint_velocity"
-    timeout_s: Timeout = 0.5
-    start_timeout_s: StartTimeout = 30.0
 
     def build(self, arm: ArmModel) -> KernelResolver:
         """The resolver, its controller started.
@@ -44,9 +36,7 @@ class ExternalConfig(PartConfig):
         Raises:
             SurgsimError: If no command is given for it, or it does not start.
         """
-        outside = Outside(
-            self.name, arm, JOINT_VELOCITY, timeout_s=self.timeout_s, start_timeout_s=self.start_timeout_s
-        )
+        outside = self.outside(arm, JOINT_VELOCITY)
         return KernelResolver(
             kernel=external_velocity,
             arm=arm,

@@ -5,12 +5,10 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from surgsim.catalog import Name, PartConfig
 from surgsim.compiled import compiled
-from surgsim.control.external.config import StartTimeout, Timeout
+from surgsim.control.external.config import ExternalPartConfig
 from surgsim.control.external.exchange import POST_SIZE, exchange
 from surgsim.control.external.layout import JOINT_TORQUE
-from surgsim.control.external.outside import Outside
 from surgsim.control.torque_laws.base import KernelTorqueLaw
 from surgsim.models.arm import ArmModel
 from surgsim.tick.arrays import Seen
@@ -21,23 +19,17 @@ Array = NDArray[np.float64]
 _ADDS_BIAS = POST_SIZE
 
 
-class ExternalLawConfig(PartConfig):
+class ExternalLawConfig(ExternalPartConfig):
     """Asks a controller outside surgsim, a process or a C function, for the joint torques.
 
     Attributes:
-        name: The controller: its command is given by `--external NAME=COMMAND`, or by the user's own file.
         gives: What it answers.
         add_bias: Whether gravity, Coriolis and centrifugal torque of the nominal model are added.
-        timeout_s: How long a process may take for an answer [s].
-        start_timeout_s: How long it may take to start [s].
     """
 
     type: Literal["external"] = "external"
-    name: Name = "mine"
     gives: Literal["joint_torque"] = "joint_torque"
     add_bias: bool = True
-    timeout_s: Timeout = 0.5
-    start_timeout_s: StartTimeout = 30.0
 
     def build(self, arm: ArmModel) -> KernelTorqueLaw:
         """The law, its controller started.
@@ -45,9 +37,7 @@ class ExternalLawConfig(PartConfig):
         Raises:
             SurgsimError: If no command is given for it, or it does not start.
         """
-        outside = Outside(
-            self.name, arm, JOINT_TORQUE, timeout_s=self.timeout_s, start_timeout_s=self.start_timeout_s
-        )
+        outside = self.outside(arm, JOINT_TORQUE)
         return KernelTorqueLaw(
             kernel=external_torque,
             arm=arm,

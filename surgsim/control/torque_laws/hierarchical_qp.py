@@ -4,9 +4,9 @@ from typing import Annotated, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field, NonNegativeFloat, PositiveFloat
+from pydantic import Field, PositiveFloat
 
-from surgsim.catalog import PartConfig, Surroundings
+from surgsim.catalog import Surroundings
 from surgsim.compiled import compiled
 from surgsim.control.acceleration import TORQUE_SHARE, fill_acceleration_bounds
 from surgsim.control.barriers import fill_entry_barrier, fill_plane_barriers
@@ -15,8 +15,9 @@ from surgsim.control.observer import delay_size, observer_size, remember_command
 from surgsim.control.planes import PlaneConfig, plane_numbers
 from surgsim.control.task_programs import solve_tasks
 from surgsim.control.torque_laws.base import KernelTorqueLaw
-from surgsim.control.torque_laws.rcm_hierarchy import HIERARCHY_GAINS, fill_demand
+from surgsim.control.torque_laws.rcm_hierarchy import HIERARCHY_GAINS, Pair, fill_demand, hierarchy_gains
 from surgsim.control.torque_laws.rcm_inverse_dynamics import foresee, whole_share
+from surgsim.control.torque_laws.rcm_tasks import RcmTasksConfig
 from surgsim.models.arm import ArmModel
 from surgsim.tick.algebra import back_substitute, dot, factor, times
 from surgsim.tick.arrays import Seen
@@ -36,7 +37,7 @@ MOTION, BIAS, DISTURBANCE, LIMITS, RELAXED = range(5)
 TERMS = ("motion", "bias", "observer", "limits", "relaxed")
 
 
-class HierarchicalQpConfig(PartConfig):
+class HierarchicalQpConfig(RcmTasksConfig):
     """Quadratic programs for RCM over tip over posture, the limits of torque, rate and motion as rows.
 
     Attributes:
@@ -44,12 +45,6 @@ class HierarchicalQpConfig(PartConfig):
         rcm_weight: Of the RCM rows, `weighted` [s^4/m^2].
         tip_weight: Of the tip rows, `weighted` [s^4/m^2].
         posture_weight: Of the posture in the metric of the inertia, `weighted`.
-        rcm_stiffness_per_s2: Proportional gain of the RCM error [1/s^2].
-        rcm_damping_ratio: Damping of the RCM error's second-order dynamics.
-        tip_stiffness_per_s2: Proportional gain of the tip error [1/s^2].
-        tip_damping_ratio: Damping of the tip error's dynamics.
-        joint_stiffness_per_s2: Gain about the joint reference [1/s^2].
-        joint_damping_ratio: Damping there.
         drive_share: On elastic drives all bandwidths are at most this share of the lowest sqrt(K / B_s).
         drive_damping_ratio: Damping of RCM and tip where that bounds their bandwidth.
         torque_rate_nm_per_s: Fastest change of a torque; null: what the arm's drives take [N m/s].
@@ -70,12 +65,6 @@ class HierarchicalQpConfig(PartConfig):
     rcm_weight: PositiveFloat = 10.0
     tip_weight: PositiveFloat = 1.0
     posture_weight: PositiveFloat = 1e-5
-    rcm_stiffness_per_s2: PositiveFloat = 2e4
-    rcm_damping_ratio: PositiveFloat = 1.0
-    tip_stiffness_per_s2: PositiveFloat = 1e4
-    tip_damping_ratio: PositiveFloat = 1.0
-    joint_stiffness_per_s2: NonNegativeFloat = 100.0
-    joint_damping_ratio: NonNegativeFloat = 1.0
     drive_share: PositiveFloat = 0.25
     drive_damping_ratio: PositiveFloat = 0.5
     torque_rate_nm_per_s: PositiveFloat | None = None
@@ -122,20 +111,17 @@ class HierarchicalQpConfig(PartConfig):
             failures={INFEASIBLE: "the programs of the hierarchy have no answer"},
         )
 
-    def _hierarchy(self, most: float) -> tuple[float, ...]:
+    def _hierarchy(self, most: float) -> list[float]:
         """Gains of RCM, tip and posture, for bandwidths of at most `most` [rad/s]."""
 
-        def pair(stiffness: float, ratio: float, bounded_ratio: float) -> tuple[float, float]:
-            if stiffness > most * most:
-                stiffness, ratio = most * most, bounded_ratio
-            return stiffness, 2.0 * ratio * stiffness**0.5
+        def pair(stiffness: float, ratio: float, bounded_ratio: float) -> Pair:
+            return (most * most, bounded_ratio) if stiffness > most * most else (stiffness, ratio)
 
         bounded = self.drive_damping_ratio
-        return (
-            *pair(self.rcm_stiffness_per_s2, self.rcm_damping_ratio, bounded),
-            *pair(self.tip_stiffness_per_s2, self.tip_damping_ratio, bounded),
-            *pair(self.joint_stiffness_per_s2, self.joint_damping_ratio, self.joint_damping_ratio),
-            *(0.0,) * (HIERARCHY_GAINS - 6),
+        return hierarchy_gains(
+            pair(self.rcm_stiffness_per_s2, self.rcm_damping_ratio, bounded),
+            pair(self.tip_stiffness_per_s2, self.tip_damping_ratio, bounded),
+            pair(self.joint_stiffness_per_s2, self.joint_damping_ratio, self.joint_damping_ratio),
         )
 
 

@@ -9,7 +9,13 @@ from pydantic import NonNegativeFloat, PositiveFloat
 from surgsim.compiled import compiled
 from surgsim.control.elastic_observer import DELAY, ElasticObserverConfig, look_ahead, send
 from surgsim.control.torque_laws.base import KernelTorqueLaw
-from surgsim.control.torque_laws.rcm_hierarchy import HIERARCHY_GAINS, LIMITS, TERMS, fill_terms
+from surgsim.control.torque_laws.rcm_hierarchy import (
+    HIERARCHY_GAINS,
+    LIMITS,
+    TERMS,
+    fill_terms,
+    hierarchy_gains,
+)
 from surgsim.models.arm import ArmModel
 from surgsim.tick.arrays import Seen
 from surgsim.tick.scratch import scratch
@@ -42,12 +48,13 @@ class RcmElasticDynamicsConfig(ElasticObserverConfig):
         numbers = self.numbers(arm)
         rcm = min(self.bandwidth_share * arm.locked_frequency, self.most_bandwidth_rad_per_s)
         tip, joint, ratio = self.tip_bandwidth_ratio * rcm, self.joint_bandwidth_rad_per_s, self.damping_ratio
-        pairs = [(w * w, 2.0 * zeta * w) for w, zeta in ((rcm, ratio), (tip, ratio), (joint, 1.0))]
         return KernelTorqueLaw(
             kernel=rcm_elastic_dynamics,
             arm=arm,
             terms=TERMS,
-            gains=np.concatenate([*pairs, np.zeros(4), numbers]),
+            gains=np.concatenate(
+                [hierarchy_gains((rcm**2, ratio), (tip**2, ratio), (joint**2, 1.0)), numbers]
+            ),
             memory_size=self.memory_size(arm.limits.torque.size),
             failures={INFEASIBLE: "no joint acceleration keeps all limits"},
         )

@@ -31,6 +31,20 @@ HIERARCHY_GAINS = 10
 TIP, RCM, JOINT, BIAS, DISTURBANCE, LIMITS = range(6)
 """Rows of the terms."""
 TERMS = ("tip", "rcm", "joint", "bias", "observer", "limits")
+Pair = tuple[float, float]
+
+
+def hierarchy_gains(rcm: Pair, tip: Pair, joint: Pair, *further: float) -> list[float]:
+    """The gains (HIERARCHY_GAINS,) with which those of a law begin.
+
+    Args:
+        rcm: Stiffness k [1/s^2] and damping ratio z of the error's dynamics e'' + 2 z sqrt(k) e' + k e = 0.
+        tip: Of the tip, likewise.
+        joint: Of the posture.
+        further: From `SENSOR_DELAY` on; the others are 0.
+    """
+    own = [gain for k, ratio in (rcm, tip, joint) for gain in (k, 2.0 * ratio * k**0.5)]
+    return [*own, *further, *[0.0] * (HIERARCHY_GAINS - len(own) - len(further))]
 
 
 @compiled

@@ -6,7 +6,6 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, NonNegativeFloat, PositiveFloat, model_validator
 
-from surgsim.catalog import PartConfig
 from surgsim.compiled import compiled
 from surgsim.control.observer import (
     delay_size,
@@ -18,6 +17,7 @@ from surgsim.control.observer import (
 )
 from surgsim.control.torque_laws.base import KernelTorqueLaw
 from surgsim.control.torque_laws.rcm_hierarchy import HIERARCHY_GAINS, TERMS, YIELDS, fill_terms
+from surgsim.control.torque_laws.rcm_tasks import RcmTasksConfig
 from surgsim.models.arm import ArmModel
 from surgsim.tick.algebra import back_substitute, factor, transposed_times
 from surgsim.tick.arrays import Seen
@@ -31,16 +31,10 @@ OBSERVER, MOST_DELAY, FULL_GAIN, MOTORS = range(HIERARCHY_GAINS, HIERARCHY_GAINS
 """Places of the gains that are this law's own; from MOTORS on the inertias of real drives' motors (n,)."""
 
 
-class RcmInverseDynamicsConfig(PartConfig):
+class RcmInverseDynamicsConfig(RcmTasksConfig):
     """Inverse dynamics of RCM, tip and posture in strict priority, with a disturbance observer.
 
     Attributes:
-        rcm_stiffness_per_s2: Proportional gain of the RCM error, per unit mass [1/s^2].
-        rcm_damping_ratio: Damping of the RCM error's second-order dynamics.
-        tip_stiffness_per_s2: Proportional gain of the tip error [1/s^2].
-        tip_damping_ratio: Damping of the tip error's dynamics.
-        joint_stiffness_per_s2: Gain about the joint reference in the remaining null space [1/s^2].
-        joint_damping_ratio: Damping there.
         observer_gain: Share of a period's unexplained velocity change that the disturbance observer takes
             in; 0 switches it off.
         most_delay_ticks: Longest actuation delay that is recognised and predicted over; 0 switches the
@@ -59,12 +53,6 @@ class RcmInverseDynamicsConfig(PartConfig):
     """
 
     type: Literal["rcm_inverse_dynamics"] = "rcm_inverse_dynamics"
-    rcm_stiffness_per_s2: PositiveFloat = 2e4
-    rcm_damping_ratio: PositiveFloat = 1.0
-    tip_stiffness_per_s2: PositiveFloat = 1e4
-    tip_damping_ratio: PositiveFloat = 1.0
-    joint_stiffness_per_s2: NonNegativeFloat = 100.0
-    joint_damping_ratio: NonNegativeFloat = 1.0
     observer_gain: Annotated[float, Field(ge=0.0, le=1.0)] = 0.3
     most_delay_ticks: Annotated[int, Field(ge=0, le=1000)] = 20
     full_gain_delay_s: PositiveFloat = 0.01
@@ -89,16 +77,12 @@ class RcmInverseDynamicsConfig(PartConfig):
             terms=TERMS,
             gains=np.array(
                 [
-                    self.rcm_stiffness_per_s2,
-                    2.0 * self.rcm_damping_ratio * self.rcm_stiffness_per_s2**0.5,
-                    self.tip_stiffness_per_s2,
-                    2.0 * self.tip_damping_ratio * self.tip_stiffness_per_s2**0.5,
-                    self.joint_stiffness_per_s2,
-                    2.0 * self.joint_damping_ratio * self.joint_stiffness_per_s2**0.5,
-                    self.sensor_delay_s,
-                    self.contact == "yield",
-                    self.energy_valve,
-                    self.press_max_n or 0.0,
+                    *self.task_gains(
+                        self.sensor_delay_s,
+                        self.contact == "yield",
+                        self.energy_valve,
+                        self.press_max_n or 0.0,
+                    ),
                     self.observer_gain,
                     self.most_delay_ticks,
                     self.full_gain_delay_s,

@@ -89,6 +89,7 @@ class RcmMpcConfig(ElasticObserverConfig):
         )
 
 
+@compiled
 def rows_of(n: int, blocks: int) -> int:
     """Variables and rows of the program of n joints: accelerations; then torques and velocities."""
     return 3 * n * blocks
@@ -131,7 +132,7 @@ def rcm_mpc(gains: Array, seen: Seen, memory: Array, out: Array) -> int:
     """
     n, numbers = seen.q.size, gains[OBSERVER:]
     blocks = int(gains[BLOCKS])
-    size = memory.size - 3 * n * blocks
+    size = memory.size - rows_of(n, blocks)
     d = scratch(n)
     status = look_ahead(numbers, seen, memory[:size], d)
     if status != GOES_ON:

@@ -6,10 +6,7 @@ from pydantic import NonNegativeFloat, PositiveFloat
 
 from surgsim.catalog import PartConfig
 from surgsim.compiled import compiled
-from surgsim.control.torque_laws.rcm_hierarchy import (
-    HIERARCHY_GAINS,
-    fill_demand,
-)
+from surgsim.control.torque_laws.rcm_hierarchy import HIERARCHY_GAINS, fill_demand, hierarchy_gains
 from surgsim.tick.arrays import Seen
 from surgsim.tick.nominal import copy_model
 
@@ -37,14 +34,14 @@ class RcmTasksConfig(PartConfig):
     joint_stiffness_per_s2: NonNegativeFloat = 100.0
     joint_damping_ratio: NonNegativeFloat = 1.0
 
-    def task_gains(self) -> list[float]:
-        """Gains (OWN_GAINS,) of the tasks, for `wanted`."""
-        pairs = (
+    def task_gains(self, *further: float) -> list[float]:
+        """Gains (OWN_GAINS,) of the tasks, then those of `hierarchy_gains` that are not the tasks'."""
+        return hierarchy_gains(
             (self.rcm_stiffness_per_s2, self.rcm_damping_ratio),
             (self.tip_stiffness_per_s2, self.tip_damping_ratio),
             (self.joint_stiffness_per_s2, self.joint_damping_ratio),
+            *further,
         )
-        return [gain for k, ratio in pairs for gain in (k, 2.0 * ratio * k**0.5)] + [0.0] * 4
 
 
 @compiled
