@@ -53,7 +53,9 @@ class Surroundings(Protocol):
 class PartConfig(BaseModel):
     """Base of every config: frozen, strict, unknown keys refused."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
+    model_config = ConfigDict(
+        frozen=True, extra="forbid", strict=True, allow_inf_nan=False, defer_build=True
+    )  # built at the first use: a scenario names a few of a hundred
 
     def check(self, scenario: Surroundings) -> None:
         """Refuse a scenario that the part does not fit.

@@ -23,7 +23,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import stats
+from scipy.special import ndtr, ndtri, stdtrit
 
 Array = NDArray[np.float64]
 
@@ -151,8 +151,8 @@ def percentile(figures: Array, sizes: Sequence[int]) -> tuple[float, float]:
     degrees of freedom counted over all of them: exact for the mean of normal data.
     """
     per_stratum, freedom = float(np.mean(sizes)), sum(sizes) - len(sizes)
-    t = stats.t.ppf((1 + LEVEL) / 2, freedom)
-    tail = float(stats.norm.cdf(-np.sqrt(per_stratum / (per_stratum - 1)) * t))
+    t = stdtrit(freedom, (1 + LEVEL) / 2)
+    tail = float(ndtr(-np.sqrt(per_stratum / (per_stratum - 1)) * t))
     low, high = np.quantile(figures[np.isfinite(figures)], [tail, 1 - tail])
     return float(low), float(high)
 
@@ -162,7 +162,7 @@ def proportion_interval(share: float, sizes: Sequence[int]) -> Interval:
     n, note = sum(sizes), too_few(sizes)
     if note:
         return Interval(value=share if n else None, n=n, note=note)
-    z = float(stats.norm.ppf((1 + LEVEL) / 2))
+    z = float(ndtri((1 + LEVEL) / 2))
     centre = (share + z * z / (2 * n)) / (1 + z * z / n)
     half = z * np.sqrt(share * (1 - share) / n + z * z / (4 * n * n)) / (1 + z * z / n)
     return Interval(value=share, low=max(0.0, float(centre - half)), high=min(1.0, float(centre + half)), n=n)

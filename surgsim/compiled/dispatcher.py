@@ -12,6 +12,7 @@ from numba.core.typeinfer import register_dispatcher
 
 from surgsim.compiled.cache import KernelCache
 from surgsim.compiled.library import KernelCompiler
+from surgsim.compiled.refusals import short_refusals
 
 _OPTIONS = {"nopython": True, "nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
 
@@ -24,6 +25,11 @@ class _Form(CPUDispatcher):
         self.py_func = function
         self._cache = KernelCache(self, compiled)
         self._of_signature: dict[Any, _Form] = {}
+
+    def compile(self, sig: Any) -> Any:
+        """The function compiled for the types of `sig`."""
+        with short_refusals():
+            return super().compile(sig)
 
     def for_signature(self, signature: Any) -> "_Form":
         """The kernel compiled for `signature`, which takes no other types and returns its type."""

@@ -5,7 +5,6 @@ file beside them is needed. World frame: that of the scene.
 """
 
 from collections.abc import Mapping
-from xml.sax.saxutils import quoteattr
 
 import mujoco
 import numpy as np
@@ -34,7 +33,7 @@ def mjcf_of(arm: ArmModel) -> str:
     ]
     for i, limit in enumerate(arm.limits.torque):
         lines.append(
-            f'<motor name="motor{i + 1}" joint={quoteattr(_joint(model, i))} ctrllimited="true" '
+            f'<motor name="motor{i + 1}" joint={_quoted(_joint(model, i))} ctrllimited="true" '
             f'ctrlrange="{-limit:.17g} {limit:.17g}"/>'
         )
     return "\n".join([*lines, "</actuator>", "</mujoco>"])
@@ -48,7 +47,7 @@ def _children(model: mujoco.MjModel, parent: int) -> list[str]:
             continue
         name = mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_BODY, body) or f"body{body}"
         place = f'pos="{_text(model.body_pos[body])}" quat="{_text(model.body_quat[body])}"'
-        lines.append(f"<body name={quoteattr(name)} {place}>")
+        lines.append(f"<body name={_quoted(name)} {place}>")
         if model.body_mass[body] > 0.0:
             lines.append(
                 f'<inertial pos="{_text(model.body_ipos[body])}" quat="{_text(model.body_iquat[body])}" '
@@ -59,7 +58,7 @@ def _children(model: mujoco.MjModel, parent: int) -> list[str]:
                 lines.append(_mjcf_joint(model, i))
         for site in range(model.nsite):
             if model.site_bodyid[site] == body:
-                named = quoteattr(mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_SITE, site) or f"site{site}")
+                named = _quoted(mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_SITE, site) or f"site{site}")
                 where = f'pos="{_text(model.site_pos[site])}" quat="{_text(model.site_quat[site])}"'
                 lines.append(f"<site name={named} {where}/>")
         lines += [*_children(model, body), "</body>"]
@@ -70,7 +69,7 @@ def _mjcf_joint(model: mujoco.MjModel, i: int) -> str:
     """A hinge, its damping and the inertia of its motor."""
     dof = model.jnt_dofadr[i]
     return (
-        f'<joint name={quoteattr(_joint(model, i))} type="hinge" pos="{_text(model.jnt_pos[i])}" '
+        f'<joint name={_quoted(_joint(model, i))} type="hinge" pos="{_text(model.jnt_pos[i])}" '
         f'axis="{_text(model.jnt_axis[i])}" limited="true" range="{_text(model.jnt_range[i])}" '
         f'damping="{model.dof_damping[dof]:.17g}" armature="{model.dof_armature[dof]:.17g}"/>'
     )
@@ -163,3 +162,10 @@ def _joint(model: mujoco.MjModel, i: int) -> str:
 
 def _text(values: Array) -> str:
     return " ".join(f"{value:.17g}" for value in values)
+
+
+def _quoted(name: str) -> str:
+    """A name as the value of an attribute."""
+    from xml.sax.saxutils import quoteattr  # it brings http and ssl, which take 0.1 s to import
+
+    return quoteattr(name)

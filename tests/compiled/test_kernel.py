@@ -237,3 +237,30 @@ def test_a_callee_that_another_process_compiled_again_costs_no_process_its_life(
     assert float(workshop.process(OTHERS, 0)) == 7.0
     assert gone.exists()
     assert float(workshop.process("import user; print(user.outer(user.record))", 0)) == 8.0
+
+
+ASSIGNING = """
+import numpy as np
+from numba import njit
+from surgsim.compiled import compiled
+
+@compiled
+def ours(out, values):
+    out[:] = values
+
+@njit
+def theirs(out, values):
+    out[:] = values
+"""
+
+
+def test_an_array_of_another_size_is_refused_shortly_in_kernels_alone(workshop):
+    workshop.write(user=ASSIGNING)
+    user = workshop.run("user")
+    out = np.zeros(3)
+    user.ours(out, np.ones(3))
+    np.testing.assert_array_equal(out, np.ones(3))
+    with pytest.raises(ValueError, match="cannot assign an array to a slice of another size"):
+        user.ours(out, np.ones(2))
+    with pytest.raises(ValueError, match=r"slice of shape \(3,\) from input of shape \(2,\)"):
+        user.theirs(out, np.ones(2))

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import ConvexHull, QhullError
 
 from surgsim.spatial import Array
 
@@ -103,6 +102,8 @@ def _round(kind: int, size: Array) -> Array | None:
 
 def hull(points: Array) -> NDArray[np.int64]:
     """Triangles (m, 3) of the convex hull of `points`, seen anticlockwise from outside; none if flat."""
+    from scipy.spatial import ConvexHull, QhullError  # 0.3 s to import, for adopted arms alone
+
     try:
         found = ConvexHull(points)
     except (QhullError, ValueError):

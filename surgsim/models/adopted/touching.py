@@ -4,14 +4,17 @@ A capsule holds more than the link does, so that neighbours' capsules overlap wh
 """
 
 from collections.abc import Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING
 
 import mujoco
 import numpy as np
-from scipy.spatial import cKDTree
 
 from surgsim.models.adopted.capsules import Capsule
 from surgsim.models.adopted.surface import SPACING_M
 from surgsim.spatial import Array, segment_distance_squared
+
+if TYPE_CHECKING:
+    from scipy.spatial import cKDTree
 
 NEXT_THAT_CAN_TOUCH = 3
 """Along the chain: nearer parts are held apart by the joints' ranges."""
@@ -40,6 +43,8 @@ def never_touch(
         ranges: Of the joints (n, 2) [rad].
         home: A posture in which nothing touches (n,) [rad], if one is known.
     """
+    from scipy.spatial import cKDTree  # 0.3 s to import, for adopted arms alone
+
     rng = np.random.default_rng(0)
     postures = rng.uniform(ranges[:, 0], ranges[:, 1], (_POSTURES, len(ranges)))
     if home is not None:
@@ -106,7 +111,7 @@ def _meet(
     places: Mapping[str, tuple[Array, Array]],
     one: str,
     other: str,
-    trees: Mapping[str, cKDTree],
+    trees: "Mapping[str, cKDTree]",
     points: Mapping[str, Array],
 ) -> bool:
     """Whether the surfaces come as near to each other as their points stand for."""
