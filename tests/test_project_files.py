@@ -5,6 +5,7 @@ import subprocess
 import tomllib
 from pathlib import Path
 
+import pytest
 from ruamel.yaml import YAML
 
 import surgsim
@@ -43,3 +44,29 @@ def test_every_file_has_a_name_that_was_meant():
 
 def test_the_package_says_that_it_is_typed():
     assert (ROOT / "surgsim" / "py.typed").is_file()
+
+
+def test_the_workflow_runs_what_ci_runs_and_nobody_else_s_commands():
+    flow = YAML(typ="safe").load((ROOT / ".github" / "workflows" / "tests.yml").read_text("utf-8"))
+    jobs = flow["jobs"]
+    commands = [step["run"] for job in jobs.values() for step in job["steps"] if "run" in step]
+    assert any(".ci/run" in command for command in commands)
+    assert flow["permissions"] == {}
+    assert all(job["permissions"] == {"contents": "read"} and job["timeout-minutes"] for job in jobs.values())
+
+
+def test_the_hooks_are_what_make_check_runs():
+    hooks = YAML(typ="safe").load((ROOT / ".pre-commit-config.yaml").read_text("utf-8"))["repos"][0]["hooks"]
+    checks = (ROOT / "Makefile").read_text("utf-8").split("\ncheck:")[1].split("\n\n")[0]
+    for hook in hooks:
+        words = hook["entry"].removeprefix(".venv/bin/").replace(" --force-exclude", "")
+        assert words in checks.replace(" --check", ""), f"{hook['id']} is not in make check"
+
+
+@pytest.mark.parametrize("name", ["fault", "part"])
+def test_a_form_for_issues_has_what_its_format_requires(name):
+    form = YAML(typ="safe").load((ROOT / ".github" / "ISSUE_TEMPLATE" / f"{name}.yml").read_text("utf-8"))
+    assert {"name", "description", "body"} <= set(form)
+    fields = [field["id"] for field in form["body"]]
+    assert len(fields) == len(set(fields))
+    assert all(field["attributes"]["label"] for field in form["body"])
