@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, PositiveFloat
 
-from surgsim.catalog import PartConfig
+from surgsim.catalog import PartConfig, Surroundings
 from surgsim.compiled import compiled
 from surgsim.control.inside import resolve_below
 from surgsim.control.joining import memory_size
@@ -54,6 +54,11 @@ class PolicyConfig(PartConfig):
     def needs_redundancy(self) -> int:
         """As much as the resolver of a tip velocity."""
         return redundancy_needed(self.resolver) if self.action == "tip_velocity" else 0
+
+    def check(self, scenario: Surroundings) -> None:
+        """Refuse a scenario that the resolver of a tip velocity does not fit."""
+        if self.action == "tip_velocity":
+            self.resolver.check(scenario)
 
     def build(self, arm: ArmModel) -> KernelResolver:
         """The resolver.

@@ -12,7 +12,7 @@ from surgsim.control.inside import HEAD_SIZE, resolve_below
 from surgsim.control.resolvers.base import KernelResolver
 from surgsim.control.resolvers.pinv import PinvConfig
 from surgsim.control.resolvers.policy import PolicyConfig
-from surgsim.errors import Outcome
+from surgsim.errors import Outcome, SurgsimError
 from surgsim.simulate.loop import Simulation, simulate
 from surgsim.simulate.setup import prepare
 from surgsim.tick.status import RANK_LOST
@@ -177,3 +177,10 @@ def test_a_kernel_says_itself_why_it_gave_up(arm, velocity_problem):
     silent = _kernel_over_pinv(give_up, arm)
     with pytest.raises(ControlFailure, match=r"rank|Jacobian"):
         silent.step(velocity_problem(0), None)
+
+
+def test_a_scenario_that_the_resolver_below_does_not_fit_is_refused(scenario):
+    over = "controller.resolver={{type: policy, action: {}, resolver: {{type: hands_on}}}}"
+    with pytest.raises(SurgsimError, match="'hands_on' needs the disturbance force_torque_sensor"):
+        scenario(over.format("tip_velocity"))
+    assert scenario(over.format("joint_velocity")).controller  # the resolver is not asked
