@@ -27,6 +27,7 @@ include_patterns = [
     "docs/reference/*.md",
     "docs/tutorial/*.py",
     "results/*/README.md",
+    "examples/README.md",
     "examples/external/*/README.md",
     "benchmarks/README.md",
     "CONTRIBUTING.md",

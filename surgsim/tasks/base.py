@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar, Protocol, Self, runtime_checkable
 
 import numpy as np
+from numba.extending import is_jitted
 from numpy.typing import NDArray
 from pydantic import Field, NonNegativeFloat, PositiveFloat, model_validator
 
@@ -299,9 +300,8 @@ def follow(gains: Array, rows: Array, s_dot: float, s_ddot: float, out: Command)
 
 
 def following(path: PathKernel) -> TaskKernel:
-    """The kernel of a task that follows `path` with the profile's progress."""
+    """The kernel of a task that follows `path` with the profile's progress; in Python where the path is."""
 
-    @compiled
     def kernel(gains: Array, feedback: arrays.Feedback, memory: Array, out: Command) -> int:
         s, s_dot, s_ddot = progress(gains[HOLD], gains[DURATION], gains[RAMP], feedback.t_s)
         rows = scratch_matrix(3, 3)
@@ -309,7 +309,7 @@ def following(path: PathKernel) -> TaskKernel:
         follow(gains, rows, s_dot, s_ddot, out)
         return GOES_ON
 
-    return kernel
+    return compiled(kernel) if is_jitted(path) else kernel
 
 
 class PathTask(TimedTask):
