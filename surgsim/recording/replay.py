@@ -23,7 +23,7 @@ class Replay:
         self.data = mujoco.MjData(scene.model)
         self._model = scene.model
         mujoco.mj_kinematics(self._model, self.data)
-        blocks, self._places = joint_columns(self._model)
+        blocks, self._places = joint_columns(scene.parts)
         self._others = np.column_stack(
             [np.zeros((len(trace), 0)), *(trace.block(block.name) for block in blocks)]
         )
