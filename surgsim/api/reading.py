@@ -48,7 +48,7 @@ def _summary(trace: Trace, metrics: Mapping[str, float | None]) -> dict[str, Any
     scenario = trace.meta.scenario
     return {
         "scenario": scenario["name"],
-        "controller": scenario["controller"]["name"],
+        "controller": trace.meta.controller,
         "seed": scenario["seed"],
         "outcome": trace.meta.ending.to_dict(),
         **judge(trace, metrics).to_dict(),

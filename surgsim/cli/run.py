@@ -57,20 +57,21 @@ def execute(options: argparse.Namespace) -> int:
     from surgsim.errors import Outcome, SurgsimError, UnreachableError
     from surgsim.runs.folder import run_to_folder
     from surgsim.runs.parts import check_externals
-    from surgsim.scenario.load import load_scenario
+    from surgsim.scenario.load import load_experiment, load_scenario
 
     if options.live is not None and options.operator is not None:
         raise SurgsimError(
             "--live and --operator do not go together: a person who operates sees the scene already"
         )
-    scenario = load_scenario(
+    one_arm = options.live is not None or options.operator is not None
+    scenario = (load_scenario if one_arm else load_experiment)(
         options.scenario, controller=options.controller, assignments=options.assignments, seed=options.seed
     )
     check_externals([scenario])
     operator, record = options.operator, not options.no_record
-    name = f"{scenario.controller.name}-seed{scenario.seed}"
+    name = f"{scenario.controller_name}-seed{scenario.seed}"
     folder = options.out or _default_folder(Path("runs") / scenario.name, name, operator)
-    with show_progress(f"{scenario.name} {scenario.controller.name}", operator in _LIVE) as progress:
+    with show_progress(f"{scenario.name} {scenario.controller_name}", operator in _LIVE) as progress:
         try:
             if options.live is not None:
                 from surgsim.live.showing import run_shown

@@ -7,13 +7,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surgsim.errors import SurgsimError, unknown_name
-from surgsim.models.build import build
 from surgsim.models.drawing import Drawing, FixedCamera, Line, Picture
 from surgsim.recording import palette
 from surgsim.recording.eyes import COVERS, inside_eye
 from surgsim.recording.polyline import drawn_rows
 from surgsim.recording.replay import Replay
-from surgsim.recording.scene import scenario_of
+from surgsim.recording.scene import rebuild_all, scenario_of
 from surgsim.trace.trace import Trace
 
 Array = NDArray[np.float64]
@@ -56,28 +55,35 @@ class Replayed:
         trace: The run.
         replay: Puts its scene where it was.
         drawing: Draws it.
+        first: What stands before the names of the first arm's cameras.
     """
 
-    def __init__(self, trace: Trace, replay: Replay, drawing: Drawing) -> None:
+    def __init__(self, trace: Trace, replay: Replay, drawing: Drawing, first: str) -> None:
         self.trace = trace
-        self._replay, self._drawing = replay, drawing
-        self._commanded = _line(trace.block("tip_ref"), np.arange(len(trace)), _COMMANDED, 3.0)
-        self._rows = _path_rows(trace.block("tip"))
+        self._replay, self._drawing, self._first = replay, drawing, first
+        every = np.arange(len(trace))
+        self._commanded = [_line(one.block("tip_ref"), every, _COMMANDED, 3.0) for one in trace.each()]
+        self._tips = [one.block("tip") for one in trace.each()]
+        self._rows = [_path_rows(tip) for tip in self._tips]
 
     def picture(self, row: int, camera: str, *, paths: bool = True) -> Picture:
         """What a camera saw at a row of the trace, with the path commanded and that travelled so far."""
         self._replay.place(row)
         self._replay.aim()
         hidden = COVERS if camera in _THROUGH else ()
+        name = self._first + camera if camera in _THROUGH else camera
         return self._drawing.picture(
-            self._replay.data, camera, hidden, self._lines(row, camera) if paths else ()
+            self._replay.data, name, hidden, self._lines(row, camera) if paths else ()
         )
 
     def _lines(self, row: int, camera: str) -> list[Line]:
         if camera == "overview":  # the patient is before them
             return []
-        rows = np.append(self._rows[self._rows < row], row)
-        return [self._commanded, _line(self.trace.block("tip"), rows, _TRAVELLED, 1.5, _LIFT)]
+        travelled = [
+            _line(tip, np.append(rows[rows < row], row), _TRAVELLED, 1.5, _LIFT)
+            for tip, rows in zip(self._tips, self._rows, strict=True)
+        ]
+        return [*self._commanded, *travelled]
 
 
 @contextmanager
@@ -99,10 +105,9 @@ def replayed(trace: Trace, width: int, height: int) -> Iterator[Replayed]:
             on_tip=True,
         ),
     )
-    config = scenario.scene.model_copy(update={"theatre": True})
-    scene = build(config, [*scenario.build_parts(), *cameras])
-    with Drawing(scene.model, width, height) as drawing:
-        yield Replayed(trace, Replay(scene, trace), drawing)
+    scenes = rebuild_all(scenario, theatre=True, cameras=cameras)
+    with Drawing(scenes[0].model, width, height) as drawing:
+        yield Replayed(trace, Replay(scenes, trace), drawing, scenes[0].prefix)
 
 
 def _path_rows(points: Array) -> NDArray[np.intp]:

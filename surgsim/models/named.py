@@ -64,4 +64,6 @@ class Named:
     def joints(self) -> dict[int, str]:
         """The joints of the arm and of what belongs to it, by their ids, with their own names."""
         every = {i: str(self.model.joint(i).name) for i in range(self.model.njnt)}
-        return {i: name.removeprefix(self.prefix) for i, name in every.items() if name.startswith(self.prefix)}
+        return {
+            i: name.removeprefix(self.prefix) for i, name in every.items() if name.startswith(self.prefix)
+        }

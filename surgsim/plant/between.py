@@ -138,7 +138,9 @@ class ArmsWatch:
     def look(self) -> str | None:
         """The first contact between two arms, in words, or None."""
         a, b, depth, _ = self._touching(self.record)
-        return None if b == NOTHING else f"{self._names[a]} touches {self._names[b]}, {1e3 * depth:.1f} mm deep"
+        return (
+            None if b == NOTHING else f"{self._names[a]} touches {self._names[b]}, {1e3 * depth:.1f} mm deep"
+        )
 
 
 def _looking_signature() -> Any:

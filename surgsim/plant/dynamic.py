@@ -30,7 +30,6 @@ from surgsim.plant.world import (
     KINDS,
     VALUES,
     Hook,
-    Hooks,
     HookTable,
     advance_signature,
     hook_call,

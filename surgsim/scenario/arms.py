@@ -200,6 +200,13 @@ Experiment = Scenario | ArmsScenario
 """A scenario of one arm, or of several."""
 
 
+def each_arm(scenario: Experiment) -> tuple[Scenario, ...]:
+    """The scenarios of the arms: of one alone that scenario itself."""
+    if isinstance(scenario, ArmsScenario):
+        return tuple(scenario.of(name) for name in scenario.names)
+    return (scenario,)
+
+
 def arm_seed(seed: int, k: int) -> int:
     """The seed of arm k, a child of that of the scenario."""
     return int(np.random.SeedSequence(seed, spawn_key=(_SEEDS, k)).generate_state(1)[0])

@@ -137,7 +137,9 @@ def _beside_it(document: YamlDocument) -> YamlDocument:
         for part in ("robot", "instrument"):
             given = holder.get(part)
             if isinstance(given, dict):
-                given.update({key: str(folder / given[key]) for key in KINDS if isinstance(given.get(key), str)})
+                given.update(
+                    {key: str(folder / given[key]) for key in KINDS if isinstance(given.get(key), str)}
+                )
     return replace(document, tree=tree)
 
 

@@ -33,6 +33,11 @@ class ArmsSetup:
     data: mujoco.MjData
     watch: ArmsWatch
 
+    @property
+    def duration_s(self) -> float:
+        """How long the longest of the tasks lasts [s]."""
+        return max(arm.task.duration_s for arm in self.arms.values())
+
     def close(self) -> None:
         """End what controllers have running outside."""
         for arm in self.arms.values():

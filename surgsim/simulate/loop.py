@@ -119,7 +119,7 @@ class Simulation:
 
     def run(self, progress: Progress | None = None) -> Trace:
         """Tick to the end; if that is an outcome that stops the arm, stop it and hold it for a while."""
-        duration = max(arm.setup.task.duration_s for arm in self._way.arms)
+        duration = self._setup.duration_s
         while not self.ended:
             self._advance_by(self._block(BLOCK_TICKS))
             if progress is not None:

@@ -5,7 +5,7 @@ import mujoco
 from surgsim.compiled import as_parameter
 from surgsim.errors import Outcome
 from surgsim.scenario.schema import Scenario
-from surgsim.simulate.arm_run import Array, ArmRun, stop_ticks_of, ticks_of
+from surgsim.simulate.arm_run import ArmRun, Array, stop_ticks_of, ticks_of
 from surgsim.simulate.setup import Setup
 from surgsim.simulate.ticks import (
     GOING,

@@ -45,6 +45,11 @@ class Setup:
     controller: Controller
     q_start: Array
 
+    @property
+    def duration_s(self) -> float:
+        """How long the task lasts [s]."""
+        return self.task.duration_s
+
     def close(self) -> None:
         """End what the controller has running outside."""
         self.controller.close()

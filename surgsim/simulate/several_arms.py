@@ -13,7 +13,7 @@ from surgsim.errors import Outcome
 from surgsim.plant.between import Between
 from surgsim.plant.several import SeveralPlants, Shared
 from surgsim.scenario.arms import ArmsScenario
-from surgsim.simulate.arm_run import Array, ArmRun, stop_ticks_of, ticks_of
+from surgsim.simulate.arm_run import ArmRun, Array, stop_ticks_of, ticks_of
 from surgsim.simulate.arms_setup import ArmsSetup
 from surgsim.simulate.arms_ticks import (
     ENTRY,
@@ -133,7 +133,9 @@ class SeveralArms:
 
     def _each(self, of: Callable[[ArmRun], Mapping[str, T]]) -> dict[str, T]:
         """What every arm has by name, with the arm's name before it."""
-        return {f"{name}'s {key}": value for name, arm in self._by_name.items() for key, value in of(arm).items()}
+        return {
+            f"{name}'s {key}": value for name, arm in self._by_name.items() for key, value in of(arm).items()
+        }
 
     def trace(self, ending: Ending, first: int = 0) -> Trace:
         """The rows from `first` on, with the derived columns: one time, then each arm's columns."""

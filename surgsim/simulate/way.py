@@ -5,7 +5,7 @@ from typing import Protocol
 import mujoco
 
 from surgsim.scenario.arms import Experiment
-from surgsim.simulate.arm_run import Array, ArmRun
+from surgsim.simulate.arm_run import ArmRun, Array
 from surgsim.tick.arrays import Record
 from surgsim.trace.trace import Ending, Trace
 

@@ -234,6 +234,10 @@ class Trace:
             self._each[arm] = Trace(data, blocks, self.meta.of(arm))
         return self._each[arm]
 
+    def each(self) -> "tuple[Trace, ...]":
+        """The traces of the arms: of one alone this trace itself."""
+        return tuple(self.of(arm) for arm in self.arms) or (self,)
+
     @property
     def joints(self) -> int:
         """Number of the arm's joints."""
