@@ -1,8 +1,9 @@
 """A recorded run as pictures: its scene, its cameras, and where everything was at a row of the trace."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 
+import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
@@ -22,10 +23,13 @@ CAMERAS = {
     "port_closeup": "the port, from outside",
     "inside": "the path in the patient, from a place below the port",
     "endoscope": "from beside the shaft past the tip; it moves with the tip",
+    "lens": "what an endoscope that an arm holds sees",
 }
 """Cameras by name, and what each sees."""
 
-_THROUGH = ("inside", "endoscope")
+LENS = "lens"
+"""Name of an endoscope's camera in its file."""
+_THROUGH = ("inside", "endoscope", "lens")
 """Cameras for which what covers the patient is left out."""
 
 _ENDOSCOPE_M = np.array([0.0, 0.030, -0.075])  # from the tip, z along the shaft
@@ -55,12 +59,14 @@ class Replayed:
         trace: The run.
         replay: Puts its scene where it was.
         drawing: Draws it.
-        first: What stands before the names of the first arm's cameras.
+        names: Names of the arms' cameras in the model, by what they are called here.
     """
 
-    def __init__(self, trace: Trace, replay: Replay, drawing: Drawing, first: str) -> None:
+    def __init__(
+        self, trace: Trace, replay: Replay, drawing: Drawing, names: Mapping[str, str]
+    ) -> None:
         self.trace = trace
-        self._replay, self._drawing, self._first = replay, drawing, first
+        self._replay, self._drawing, self._names = replay, drawing, names
         every = np.arange(len(trace))
         self._commanded = [_line(one.block("tip_ref"), every, _COMMANDED, 3.0) for one in trace.each()]
         self._tips = [one.block("tip") for one in trace.each()]
@@ -71,7 +77,9 @@ class Replayed:
         self._replay.place(row)
         self._replay.aim()
         hidden = COVERS if camera in _THROUGH else ()
-        name = self._first + camera if camera in _THROUGH else camera
+        name = self._names.get(camera, camera)
+        if camera == LENS and LENS not in self._names:
+            raise SurgsimError("camera 'lens': no arm of the run holds an endoscope")
         return self._drawing.picture(
             self._replay.data, name, hidden, self._lines(row, camera) if paths else ()
         )
@@ -107,7 +115,10 @@ def replayed(trace: Trace, width: int, height: int) -> Iterator[Replayed]:
     )
     scenes = rebuild_all(scenario, theatre=True, cameras=cameras)
     with Drawing(scenes[0].model, width, height) as drawing:
-        yield Replayed(trace, Replay(scenes, trace), drawing, scenes[0].prefix)
+        names = {camera.name: scenes[0].prefix + camera.name for camera in cameras}
+        lenses = [s.prefix + LENS for s in scenes if s.parts.find(mujoco.mjtObj.mjOBJ_CAMERA, LENS) >= 0]
+        names.update({LENS: lens for lens in lenses[:1]})
+        yield Replayed(trace, Replay(scenes, trace), drawing, names)
 
 
 def _path_rows(points: Array) -> NDArray[np.intp]:
