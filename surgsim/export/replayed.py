@@ -3,7 +3,6 @@
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 
-import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
@@ -62,9 +61,7 @@ class Replayed:
         names: Names of the arms' cameras in the model, by what they are called here.
     """
 
-    def __init__(
-        self, trace: Trace, replay: Replay, drawing: Drawing, names: Mapping[str, str]
-    ) -> None:
+    def __init__(self, trace: Trace, replay: Replay, drawing: Drawing, names: Mapping[str, str]) -> None:
         self.trace = trace
         self._replay, self._drawing, self._names = replay, drawing, names
         every = np.arange(len(trace))
@@ -116,8 +113,8 @@ def replayed(trace: Trace, width: int, height: int) -> Iterator[Replayed]:
     scenes = rebuild_all(scenario, theatre=True, cameras=cameras)
     with Drawing(scenes[0].model, width, height) as drawing:
         names = {camera.name: scenes[0].prefix + camera.name for camera in cameras}
-        lenses = [s.prefix + LENS for s in scenes if s.parts.find(mujoco.mjtObj.mjOBJ_CAMERA, LENS) >= 0]
-        names.update({LENS: lens for lens in lenses[:1]})
+        lenses = [s.prefix + LENS for s in scenes if s.parts.has_camera(LENS)]
+        names |= {LENS: lenses[0]} if lenses else {}
         yield Replayed(trace, Replay(scenes, trace), drawing, names)
 
 

@@ -50,6 +50,10 @@ class Named:
         """The id of a part of the arm, -1 if there is none of that name."""
         return int(mujoco.mj_name2id(self.model, kind, self.prefix + name))
 
+    def has_camera(self, name: str) -> bool:
+        """Whether the arm has a camera of that name."""
+        return self.find(mujoco.mjtObj.mjOBJ_CAMERA, name) >= 0
+
     def text(self, name: str) -> str | None:
         """A text of the arm; None if there is none of that name."""
         index = self.find(mujoco.mjtObj.mjOBJ_TEXT, name)

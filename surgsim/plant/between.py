@@ -69,8 +69,9 @@ class Between(Record):
 def arms_are_clear(between: Between) -> bool:
     """Whether no arm touches another.
 
-    A point of an arm moves by at most sum_i L_i |dq_i|, with the reaches L: two of them come nearer by at most
-    the sum over the joints of both. All is looked at again only when the room that there was could be used up.
+    A point of an arm moves by at most sum_i L_i |dq_i|, with the reaches L, and two arms come nearer by at
+    most the sum over the joints of both. All is looked at again only when the room that there was could be
+    used up.
     """
     b = between
     qpos, places = vector(b.qpos, b.nq), words(b.places, b.joints)

@@ -203,7 +203,7 @@ def _into_patient(watch: Watch, i: int, p_WC: Array, ends: Array) -> None:
 
 @compiled
 def touching_pair(watch: Watch) -> tuple[int, int, float, float]:
-    """The first pair of capsules that touch, how deep [m], and the room that is left, as `forbidden_contact`."""
+    """The first pair of capsules that touch, how deep [m], and the room left, as `forbidden_contact`."""
     ends, radii = doubles(watch.ends, 2 * watch.count, 3), vector(watch.radii, watch.count)
     pairs, room = words(watch.pairs, 2 * watch.pair_count), math.inf
     for i in range(watch.count):

@@ -232,7 +232,7 @@ def dashes(line: Array) -> list[Array]:
 def log_points(
     stream: rr.RecordingStream, trace: Trace, rows: np.ndarray[tuple[int], np.dtype[np.intp]], of: str = ""
 ) -> None:
-    """The tip, and the RCM error as an arrow from the trocar to the shaft, enlarged; `of` as in `log_paths`."""
+    """The tip, and the RCM error as an arrow from the trocar to the shaft; `of` as in `log_paths`."""
     times = [rr.TimeColumn(TIMELINE, duration=timestamps(trace["t_s"][rows]))]
     tip, trocar = trace.block("tip")[rows], trace.block("trocar")[rows]
     point, arrow = f"{SCENE}/{of}tip", f"{SCENE}/{of}rcm_error_x{RCM_ARROW_SCALE:g}"

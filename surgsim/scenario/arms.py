@@ -1,7 +1,7 @@
 """The scenario of several arms in one patient: what they share, and for each what a scenario of one has.
 
-An arm of it is a scenario of one arm (`ArmsScenario.of`): whatever is built, recorded and judged of one arm is
-built, recorded and judged of each. Only the model and its time are shared.
+An arm of it is a scenario of one arm (`ArmsScenario.of`): whatever is built, recorded and judged of one arm
+is built, recorded and judged of each. Only the model and its time are shared.
 """
 
 import hashlib
@@ -219,7 +219,7 @@ def index_of(arm: str, names: tuple[str, ...]) -> int:
         UnknownNameError: If there is no such arm.
     """
     if arm not in names:
-        raise not_held(arm, "arm of this scenario", names, "its names")
+        raise not_held(arm, "known arm of this scenario", names, "its names")
     return names.index(arm)
 
 

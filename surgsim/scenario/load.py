@@ -32,6 +32,11 @@ def shipped(folder: str = "") -> dict[str, Path]:
     return {path.stem: path for path in sorted((resource_dir("scenarios") / folder).glob("*.yaml"))}
 
 
+def of_one_arm(files: Mapping[str, Path]) -> list[str]:
+    """Those of shipped scenarios that have one arm: what is made for one is made for each of them."""
+    return [name for name, path in files.items() if "\narms:" not in path.read_text(encoding="utf-8")]
+
+
 def shipped_safety() -> dict[str, Path]:
     """Names, such as `safety/tip_limit`, and files of the scenarios that end early, one for each outcome."""
     return {f"safety/{name}": path for name, path in shipped("safety").items()}
@@ -144,7 +149,7 @@ def _beside_it(document: YamlDocument) -> YamlDocument:
 
 
 def _holders(tree: dict[str, Any]) -> list[tuple[KeyPath, dict[str, Any]]]:
-    """The mappings of a scenario that have a robot and a controller, and where: its own, or those of its arms."""
+    """The mappings that have a robot and a controller, and where: the scenario itself, or each arm."""
     arms = tree.get("arms")
     if "arms" not in tree:
         return [((), tree)]

@@ -34,6 +34,11 @@ class ArmsSetup:
     watch: ArmsWatch
 
     @property
+    def model(self) -> mujoco.MjModel:
+        """MuJoCo's model, which all share."""
+        return self.plants[0].scene.model
+
+    @property
     def duration_s(self) -> float:
         """How long the longest of the tasks lasts [s]."""
         return max(arm.task.duration_s for arm in self.arms.values())

@@ -1,4 +1,4 @@
-"""The control loop of several arms: each decides as `surgsim.simulate.ticks` says, then time passes for all."""
+"""The control loop of several arms: each decides as in `surgsim.simulate.ticks`, then time passes for all."""
 
 from functools import cache
 from typing import Any, ClassVar
@@ -38,8 +38,8 @@ class Arms(Record):
     """Several arms on their way.
 
     Attributes:
-        table: Address of the arms: for each the address of `arm_tick` for its joints, and those of its records
-            in the order of that kernel's parameters (count, 8).
+        table: Address of the arms: for each the address of `arm_tick` for its joints, and those of its
+            records in the order of that kernel's parameters (count, 8).
         reasons: Address of why each arm's tick ends the run, or `GOING` (count,).
         count: Arms.
         reason: Why the loop came back.

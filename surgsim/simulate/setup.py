@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import TypeGuard
 
+import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
@@ -44,6 +45,16 @@ class Setup:
     plant: Plant
     controller: Controller
     q_start: Array
+
+    @property
+    def model(self) -> mujoco.MjModel:
+        """MuJoCo's model."""
+        return self.scene.model
+
+    @property
+    def data(self) -> mujoco.MjData:
+        """MuJoCo's data."""
+        return self.plant.data
 
     @property
     def duration_s(self) -> float:

@@ -104,8 +104,8 @@ class TraceMeta:
         scenario: The resolved scenario.
         control_period_s: Time between rows [s].
         limits: Joint limits: q_min, q_max, velocity, acceleration, torque, and where they are published jerk
-            and torque_rate; a number for each joint, SI. Where there are several arms, with the arm's name and
-            `_` before them.
+            and torque_rate; a number for each joint, SI. Where there are several arms, with the arm's name
+            and `_` before them.
         ending: How the run ended.
     """
 
@@ -224,7 +224,7 @@ class Trace:
             SurgsimError: If there is no such arm.
         """
         if arm not in self.arms:
-            raise not_held(arm, "arm of this trace", self.arms, "its arms")
+            raise not_held(arm, "known arm of this trace", self.arms, "its arms")
         if arm not in self._each:
             first = f"{arm}_"
             kept = [b for b in self.blocks if b.name == "t" or b.name.startswith(first)]
