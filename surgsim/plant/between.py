@@ -145,5 +145,5 @@ class ArmsWatch:
 
 
 def _looking_signature() -> Any:
-    found = types.Tuple((types.int64, types.int64, types.float64, types.float64))
+    found: Any = types.Tuple((types.int64, types.int64, types.float64, types.float64))  # type: ignore[no-untyped-call]
     return found(type_of(Between, 0))

@@ -1,7 +1,7 @@
 """Looks for contacts that must not be: of the arm with itself, with the patient and with the table."""
 
 import math
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import mujoco
 import numpy as np
@@ -14,6 +14,9 @@ from surgsim.spatial import segment_distance_squared
 from surgsim.tick.arrays import Record, World, new
 from surgsim.tick.scratch import scratch
 from surgsim.tick.views import doubles, vector, words
+
+if TYPE_CHECKING:
+    from surgsim.plant.between import Between
 
 Array = NDArray[np.float64]
 
@@ -178,7 +181,7 @@ def is_clear(watch: Watch, world: World) -> bool:
 
 
 @compiled
-def _place(watch: Watch, i: int, ends: Array) -> None:
+def _place(watch: "Watch | Between", i: int, ends: Array) -> None:
     """End points of a capsule, world frame."""
     body = words(watch.bodies, watch.count)[i]
     p, R = doubles(watch.xpos, watch.nbody, 3)[body], doubles(watch.xmat, watch.nbody, 9)[body]
@@ -202,7 +205,7 @@ def _into_patient(watch: Watch, i: int, p_WC: Array, ends: Array) -> None:
 
 
 @compiled
-def touching_pair(watch: Watch) -> tuple[int, int, float, float]:
+def touching_pair(watch: "Watch | Between") -> tuple[int, int, float, float]:
     """The first pair of capsules that touch, how deep [m], and the room left, as `forbidden_contact`."""
     ends, radii = doubles(watch.ends, 2 * watch.count, 3), vector(watch.radii, watch.count)
     pairs, room = words(watch.pairs, 2 * watch.pair_count), math.inf

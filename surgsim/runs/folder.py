@@ -168,16 +168,10 @@ def _named(draft: Path, folder: Path) -> Iterator[None]:
 def summary_of_result(scenario: Experiment, result: RunResult) -> dict[str, Any]:
     """The content of `metrics.json` of a finished run."""
     outcome = result.trace.meta.ending.to_dict()
-    whole = summary_of(
-        scenario, outcome, result.verdict, result.metrics, result.wall_time_s, result.undefined
+    each = judge_each(result.trace, result.metrics)
+    return summary_of(
+        scenario, outcome, result.verdict, result.metrics, result.wall_time_s, result.undefined, each
     )
-    if isinstance(scenario, ArmsScenario):
-        verdicts = judge_each(result.trace, result.metrics)
-        whole["arms"] = {
-            arm: {"controller": scenario.of(arm).controller.name, **verdict.to_dict()}
-            for arm, verdict in verdicts.items()
-        }
-    return whole
 
 
 def summary_of(
@@ -187,8 +181,24 @@ def summary_of(
     metrics: Mapping[str, float | None],
     wall_s: float,
     undefined: Mapping[str, str] | None = None,
+    each: Mapping[str, Verdict] | None = None,
 ) -> dict[str, Any]:
-    """The content of `metrics.json`; `undefined` says why, for each metric that could not be computed."""
+    """The content of `metrics.json`.
+
+    Args:
+        scenario: What was run.
+        outcome: How it ended.
+        verdict: Whether it was done.
+        metrics: By name.
+        wall_s: Wall time [s].
+        undefined: Why, for each metric that could not be computed.
+        each: The verdict on each of several arms; that on the run for those that have none.
+    """
+    arms = scenario.arms if isinstance(scenario, ArmsScenario) else ()
+    of_arms = {
+        arm.name: {"controller": arm.controller.name, **(each or {}).get(arm.name, verdict).to_dict()}
+        for arm in arms
+    }
     return {
         "schema_version": SCHEMA_VERSION,
         "scenario": scenario.name,
@@ -197,6 +207,7 @@ def summary_of(
         "outcome": dict(outcome),
         **verdict.to_dict(),
         "metrics": dict(metrics),
+        **({"arms": of_arms} if of_arms else {}),
         "undefined": dict(undefined or {}),
         "provenance": {**provenance_of(scenario), "wall_time_s": round(wall_s, 6)},
     }

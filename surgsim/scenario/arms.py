@@ -7,7 +7,6 @@ is built, recorded and judged of each. Only the model and its time are shared.
 import hashlib
 import json
 from collections.abc import Mapping
-from functools import cached_property
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 
 import numpy as np
@@ -77,8 +76,8 @@ class ArmsScenario(PartConfig):
     """An experiment of several arms around one patient.
 
     Example:
-        >>> import surgsim
-        >>> scenario = surgsim.load("two_ports_panda")
+        >>> from surgsim.scenario.load import load_experiment
+        >>> scenario = load_experiment("two_ports_panda")
         >>> scenario.names, scenario.of("left").task.type
         (('left', 'right'), 'circle')
 
@@ -143,13 +142,13 @@ class ArmsScenario(PartConfig):
         Raises:
             UnknownNameError: If there is no such arm.
         """
-        if arm not in self._each:
-            self._each[arm] = self._scenario_of(index_of(arm, self.names))
-        return self._each[arm]
-
-    @cached_property
-    def _each(self) -> dict[str, Scenario]:
-        return {}
+        key = (self.model_dump_json(), arm)
+        if key not in _MADE:
+            made = self._scenario_of(index_of(arm, self.names))
+            if len(_MADE) >= _MOST_MADE:
+                _MADE.clear()
+            _MADE[key] = made
+        return _MADE[key]
 
     def _scenario_of(self, k: int) -> Scenario:
         arm = self.arms[k]
@@ -195,6 +194,10 @@ class ArmsScenario(PartConfig):
         text = json.dumps(resolved, sort_keys=True, separators=(",", ":"))
         return hashlib.sha256(text.encode()).hexdigest()
 
+
+_MADE: dict[tuple[str, str], Scenario] = {}
+_MOST_MADE = 64
+"""Scenarios of arms that were made, by the whole scenario and the arm: each is asked for again and again."""
 
 Experiment = Scenario | ArmsScenario
 """A scenario of one arm, or of several."""
