@@ -43,7 +43,7 @@ def print_metrics(title: str, metrics: Mapping[str, float | None], arms: Sequenc
     """
     from surgsim.metrics.catalog import GROUPS, of_one_arm
 
-    columns = [of_one_arm(metrics, arm) for arm in arms] or [metrics]
+    columns = [of_one_arm(metrics, arm) for arm in arms] or [dict(metrics)]
     rows = [
         (metric.name, *(number(column[metric.name], metric.digits) for column in columns), metric.meaning)
         for group in GROUPS

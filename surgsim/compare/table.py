@@ -93,7 +93,7 @@ def read_rows(root: Path, row: Row) -> list[dict[str, Any]]:
         return [
             {
                 **common,
-                **_of_arm(*(f"{text}.{arm}" for text in (row.run_id, name)), told, of_one_arm(metrics, arm)),
+                **_of_arm(f"{row.run_id}.{arm}", f"{name}.{arm}", told, of_one_arm(metrics, arm)),
             }
             for arm, told in arms.items()
         ]

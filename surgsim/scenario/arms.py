@@ -17,6 +17,7 @@ from surgsim.catalog import Name, PartConfig
 from surgsim.control.controller import ControllerConfig
 from surgsim.display import joined_names
 from surgsim.errors import SurgsimError, not_held
+from surgsim.models.build import Scene, SharedArm, build, build_shared
 from surgsim.models.collision import abdomen_semi_axes
 from surgsim.models.config import InstrumentConfig, PatientConfig, RobotConfig, TrocarConfig
 from surgsim.models.theatre import patient_place
@@ -208,6 +209,19 @@ def each_arm(scenario: Experiment) -> tuple[Scenario, ...]:
     if isinstance(scenario, ArmsScenario):
         return tuple(scenario.of(name) for name in scenario.names)
     return (scenario,)
+
+
+def drawn_scenes(scenario: Experiment) -> tuple[Scene, ...]:
+    """The arms in the theatre, without disturbances: what a picture of the scenario shows.
+
+    Raises:
+        SurgsimError: As `surgsim.models.build.build`.
+    """
+    configs = [one.scene.model_copy(update={"theatre": True}) for one in each_arm(scenario)]
+    if not isinstance(scenario, ArmsScenario):
+        return (build(configs[0]),)
+    pairs = zip(scenario.names, configs, strict=True)
+    return build_shared([SharedArm(name=name, config=config) for name, config in pairs])
 
 
 def arm_seed(seed: int, k: int) -> int:

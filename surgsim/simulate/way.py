@@ -14,12 +14,15 @@ class Way(Protocol):
     """Arms on their way, tick by tick.
 
     Attributes:
-        arms: The arms' records; all are at the same tick.
         stop_ticks: Ticks for which the arms are held after an outcome.
     """
 
-    arms: tuple[ArmRun, ...]
     stop_ticks: int
+
+    @property
+    def arms(self) -> tuple[ArmRun, ...]:
+        """The arms' records; all are at the same tick."""
+        ...
 
     @property
     def scenario(self) -> Experiment:

@@ -332,7 +332,8 @@ class Trace:
     def _stopped(self) -> NDArray[np.bool_]:
         """Which rows belong to the stop (rows,)."""
         told = [name for name in ("stopped", *(f"{arm}_stopped" for arm in self.arms)) if name in self]
-        return np.array([self[name] == 1.0 for name in told], dtype=bool).reshape(-1, len(self)).any(axis=0)
+        rows = np.array([self[name] == 1.0 for name in told], dtype=bool).reshape(-1, len(self))
+        return np.asarray(rows.any(axis=0))
 
     def _rows(self, mask: NDArray[np.bool_]) -> "Trace":
         return Trace(self._data[mask], self.blocks, self.meta)
