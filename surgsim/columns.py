@@ -1,7 +1,7 @@
 """Named columns: what a part of the simulation adds to the record of a run."""
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 AXES = ("x", "y", "z")
 
@@ -27,6 +27,11 @@ class Block:
         """Column names, e.g. `q1_rad`, `tip_x_m`, `manipulability`."""
         stems = [f"{self.name}{self.joiner}{label}" if label else self.name for label in self.labels]
         return tuple(f"{stem}_{self.unit}" if self.unit else stem for stem in stems)
+
+
+def of_arm(arm: str, block: Block) -> Block:
+    """The block of one of several arms: its name begins with the arm's and `_`."""
+    return replace(block, name=f"{arm}_{block.name}")
 
 
 def joints(name: str, unit: str, n: int) -> Block:

@@ -2,7 +2,7 @@
 
 import html
 import math
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterable, Sequence
 
 WIDTH = 80
 """Columns that plain text keeps to."""
@@ -67,3 +67,8 @@ def html_title(title: str, *lines: str) -> str:
     """A heading in bold with lines below it, escaped."""
     rest = "".join(f"<div>{html.escape(line)}</div>" for line in lines if line)
     return f"<div><b>{html.escape(title)}</b></div>{rest}"
+
+
+def joined_names(names: Iterable[str]) -> str:
+    """Names, each once, with a plus between them."""
+    return "+".join(dict.fromkeys(names))

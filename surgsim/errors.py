@@ -85,6 +85,7 @@ class Outcome(enum.Enum):
     RCM_LIMIT = "The shaft moved further from the trocar than the incision allows."
     TIP_LIMIT = "The tip left its path by more than the stated limit."
     SELF_COLLISION = "The arm or its instrument touched the arm."
+    ARM_COLLISION = "An arm or its instrument touched another arm."
     PATIENT_COLLISION = "The arm or its instrument touched the patient or the table."
     INCISION_TORN = "The shaft pressed on the abdominal wall harder than the incision bears."
     FORCE_LIMIT = "A force on trocar or tip passed its limit."

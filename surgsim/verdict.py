@@ -6,12 +6,13 @@ task undone, and one that did its task may have torn at the incision.
 
 import json
 from collections.abc import Iterable, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from surgsim.errors import Outcome
+from surgsim.metrics.catalog import of_one_arm
 from surgsim.scenario.thresholds import Threshold, ThresholdsConfig
 from surgsim.tasks import TASKS
 from surgsim.tasks.success import Success, path_success
@@ -110,7 +111,12 @@ def unfinished(outcome: str) -> Verdict:
 
 
 def judge(trace: Trace, metrics: Metrics) -> Verdict:
-    """The verdict on a run: a function of its trace, with its metrics at hand. It never raises."""
+    """The verdict on a run: a function of its trace, with its metrics at hand. It never raises.
+
+    Several arms have done their task when each has.
+    """
+    if trace.arms:
+        return _joined(judge_each(trace, metrics))
     scenario, ending = trace.meta.scenario, trace.meta.ending
     try:
         thresholds = ThresholdsConfig.model_validate_json(json.dumps(scenario.get("thresholds", {})))
@@ -123,6 +129,24 @@ def judge(trace: Trace, metrics: Metrics) -> Verdict:
     held = _held(thresholds, metrics, (*found.needs, *ALWAYS))
     success, reason = _with_needs(found, held)
     return Verdict(success=success, reason=reason + at_limits, thresholds=held)
+
+
+def judge_each(trace: Trace, metrics: Metrics) -> dict[str, Verdict]:
+    """The verdict on each of several arms, by its name; none where there is one arm."""
+    return {arm: judge(trace.of(arm), of_one_arm(metrics, arm)) for arm in trace.arms}
+
+
+def _joined(each: Mapping[str, Verdict]) -> Verdict:
+    """The verdict on all arms."""
+    found = [verdict.success for verdict in each.values()]
+    success = False if False in found else None if None in found else True
+    return Verdict(
+        success=success,
+        reason=", ".join(f"{arm}: {verdict.reason}" for arm, verdict in each.items()),
+        thresholds=tuple(
+            replace(held, metric=f"{arm}_{held.metric}") for arm, v in each.items() for held in v.thresholds
+        ),
+    )
 
 
 def _at_limits(trace: Trace) -> str:

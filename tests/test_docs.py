@@ -25,6 +25,7 @@ from surgsim.models.adopted.config import CapsuleConfig, FlangeConfig, LimitsCon
 from surgsim.models.config import (
     HolderConfig,
     InstrumentConfig,
+    PatientConfig,
     RobotConfig,
     TrocarConfig,
     WallConfig,
@@ -33,7 +34,8 @@ from surgsim.models.drive import DriveConfig
 from surgsim.plant import PLANTS
 from surgsim.plant.disturbances import DISTURBANCES
 from surgsim.plant.props import PROPS
-from surgsim.scenario.load import load_controller, load_scenario, shipped
+from surgsim.scenario.arms import ArmConfig, ArmsScenario
+from surgsim.scenario.load import load_controller, load_experiment, load_scenario, shipped
 from surgsim.scenario.schema import (
     RecordingConfig,
     SafetyConfig,
@@ -44,8 +46,7 @@ from surgsim.scenario.schema import (
 )
 from surgsim.scenario.thresholds import Threshold, ThresholdsConfig
 from surgsim.scenario.yaml_text import parse_yaml
-from surgsim.simulate.loop import simulate
-from surgsim.simulate.setup import prepare
+from surgsim.simulate.loop import prepared, simulate
 from surgsim.tasks import TASKS
 from surgsim.tasks.base import PathTaskConfig
 from surgsim.trace.trace import base_blocks
@@ -104,8 +105,8 @@ def test_yaml_examples_are_valid(text, tmp_path):
     path.write_text(text)
     for file, content in saved_files():
         (tmp_path / file).write_text(content)
-    if "robot" in tree:
-        prepare(load_scenario(str(path)))
+    if "robot" in tree or "arms" in tree:
+        prepared(load_experiment(str(path)))
     elif "resolver" in tree:
         load_controller(str(path))
     else:
@@ -144,6 +145,9 @@ def sections():
     """(heading of docs/scenario_format.md, config class), one for every class of the schema."""
     found = {
         "scenario": Scenario,
+        "several arms": ArmsScenario,
+        "several arms: arm": ArmConfig,
+        "patient": PatientConfig,
         "robot": RobotConfig,
         "robot: drive": DriveConfig,
         "robot: flange": FlangeConfig,

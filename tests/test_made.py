@@ -68,7 +68,17 @@ def test_what_the_results_say_of_our_controller_holds_in_the_rows():
     assert max(r["rcm_error_max_mm"] for r in ours) <= float(said[2])
 
 
-@pytest.mark.parametrize("file", ["theatre.png", "port_closeup.png", "panda.png", "fr3.png", "iiwa14.png"])
+@pytest.mark.parametrize(
+    "file",
+    [
+        "theatre.png",
+        "port_closeup.png",
+        "panda.png",
+        "fr3.png",
+        "iiwa14.png",
+        "two_ports.png",
+    ],
+)
 def test_the_pictures_are_those_of_the_current_scenes(made, file):
     draw, _ = made
     assert stamped(draw.HERE / file) == draw.scene_stamp(*draw.SCENES[file]), AGAIN

@@ -19,11 +19,12 @@ from PIL import Image
 from stamps import digest, save
 
 from surgsim.errors import SurgsimError
-from surgsim.models.build import build
+from surgsim.models.arm import ArmModel
 from surgsim.models.picture import render
 from surgsim.report.write import write_report
-from surgsim.scenario.load import load_scenario
-from surgsim.simulate.setup import Setup, prepare
+from surgsim.scenario.arms import drawn_scenes, each_arm
+from surgsim.scenario.load import load_experiment, load_scenario
+from surgsim.simulate.setup import Setup, beginning, prepare
 from surgsim.studies.figure import BLUE, GREEN, ORANGE, PURPLE, VERMILLION, figure, legend_below
 
 HERE = Path(__file__).parent
@@ -33,10 +34,12 @@ SCENES = {
     "panda.png": ("circle_panda", "overview"),
     "fr3.png": ("circle_fr3", "overview"),
     "iiwa14.png": ("circle_iiwa14", "overview"),
+    "two_ports.png": ("two_ports_panda", "overview"),
 }
 MOVING = {
     "theatre.gif": ("theatre_panda", "rcm_elastic_dynamics", "overview,inside", "2"),
     "rings.gif": ("peg_and_ring_panda", "passive_convex", "inside,endoscope", "8"),
+    "endoscope.gif": ("endoscope_and_tool_panda", "rcm_inverse_dynamics", "overview,lens", "4"),
 }
 """Scenario, controller, cameras and speed of each moving picture."""
 PATHS = ("circle", "sinusoid", "spiral")
@@ -46,10 +49,16 @@ _POINTS = 400
 
 def scene_stamp(name: str, camera: str) -> str:
     """What a picture of a scene is made from: scene, start, camera and every asset."""
-    setup = prepare(load_scenario(name))
-    told = [setup.scenario.scene.model_dump_json(), camera, _rounded(setup.q_start)]
+    each, starts = each_arm(load_experiment(name)), starts_of(name)
+    scenes = [one.scene.model_dump_json() for one in each]
+    told = [*scenes, camera, *map(_rounded, starts)]
     assets = sorted(path for path in (tables.ROOT / "assets").rglob("*") if path.is_file())
     return digest([*told, *(hashlib.sha256(path.read_bytes()).hexdigest() for path in assets)])
+
+
+def starts_of(name: str) -> list[np.ndarray]:
+    """Where each arm of a scenario starts (n,) [rad]."""
+    return [beginning(one, ArmModel(one.scene))[0] for one in each_arm(load_experiment(name))]
 
 
 def paths_stamp() -> str:
@@ -94,8 +103,7 @@ def draw_scene(file: str) -> None:
         SurgsimError: If this machine cannot draw.
     """
     name, camera = SCENES[file]
-    setup = prepare(load_scenario(name))
-    pixels = render(build(setup.scenario.scene), setup.q_start, camera)
+    pixels = render(drawn_scenes(load_experiment(name)), starts_of(name), camera)
     save(Image.fromarray(pixels), HERE / file, scene_stamp(name, camera))
 
 

@@ -68,6 +68,16 @@ GROUPS = (
         pictures={},
     ),
     Group(
+        title="Two arms in one patient",
+        starts=("two_ports_", "endoscope_and_tool_"),
+        text="Two arms through ports 8 cm apart, each with its path, or one with an endoscope that looks at "
+        "the other's: [several arms](several_arms.md).",
+        pictures={
+            "two_ports.png": "Two Pandas at their start",
+            "endoscope.gif": "The tool's circle, four times as fast, and what the 30 degree endoscope sees",
+        },
+    ),
+    Group(
         title="Teleoperation",
         starts=("teleop_", "peg_and_ring_"),
         text="An operator at a console, a delayed channel, energy tanks: [teleoperation](teleoperation.md), "

@@ -17,17 +17,17 @@ from surgsim.compare.engine import compare as run_batch
 from surgsim.compare.suite import with_changes
 from surgsim.control.controller import ControllerConfig
 from surgsim.errors import SurgsimError
+from surgsim.scenario.arms import Experiment
 from surgsim.scenario.externals import externals_given
 from surgsim.scenario.load import Source
 from surgsim.scenario.plain import assignments_of
-from surgsim.scenario.schema import Scenario
 
 Name = str | os.PathLike[str]
 Controllers = Source | ControllerConfig | Sequence[Source | ControllerConfig]
 
 
 def compare(
-    what: Source | Scenario | Sequence[Source | Scenario],
+    what: Source | Experiment | Sequence[Source | Experiment],
     /,
     *,
     controllers: Controllers | None = None,

@@ -84,7 +84,8 @@ class Comparison(Mapping[str, Run]):
     def __getitem__(self, run_id: str) -> Run:
         if run_id not in self._folders:
             raise not_held(run_id, "run of this batch", self._folders, "list(comparison)")
-        return read_run(self.folder / self._folders[run_id], self._keeper)
+        found = read_run(self.folder / self._folders[run_id], self._keeper)
+        return found.arms[run_id.rpartition(".")[2]] if found.arms else found
 
     def __iter__(self) -> Iterator[str]:
         return iter(self._folders)

@@ -21,7 +21,8 @@ def load(
     """Check a scenario, with changes, and return it with every default filled in.
 
     Args:
-        scenario: Name of a shipped scenario, path of a YAML file, its content as a mapping, or a scenario.
+        scenario: Name of a shipped scenario, path of a YAML file, its content as a mapping, or a scenario; of
+            one arm. One of several is run by `surgsim.run` and `surgsim.compare`.
         controller: Controller instead of the scenario's own: a name, a path, or its content as a mapping.
         seed: Seed instead of the scenario's own.
         settings: Values by key path, as `--set` of the command: `{"disturbances.0.mass_kg": 0.3}`.

@@ -5,6 +5,7 @@ from collections.abc import Iterator, Mapping
 from surgsim.display import html_table, number, text_table
 from surgsim.errors import not_held
 from surgsim.metrics.catalog import METRICS
+from surgsim.metrics.metric import Metric
 
 _RIGHT = (1,)
 
@@ -48,6 +49,12 @@ class Metrics(Mapping[str, float | None]):
     def _rows(self) -> list[tuple[str, str, str]]:
         rows = []
         for name, value in self.defined().items():
-            known = METRICS.get(name)
+            known = METRICS.get(name) or _of_an_arm(name)
             rows.append((name, number(value, known.digits if known else 4), known.meaning if known else ""))
         return rows
+
+
+def _of_an_arm(name: str) -> Metric | None:
+    """The metric whose name follows that of an arm, the longest such."""
+    ends = [metric for metric in METRICS.values() if name.endswith(f"_{metric.name}")]
+    return max(ends, key=lambda metric: len(metric.name), default=None)

@@ -10,7 +10,7 @@ from surgsim.api.run import Run, read_run
 from surgsim.errors import RecordingError
 from surgsim.recording.read import read_recording
 from surgsim.trace.trace import Trace
-from surgsim.verdict import judge
+from surgsim.verdict import judge, judge_each
 
 
 def read(path: str | os.PathLike[str], /) -> "Run | Comparison":
@@ -46,12 +46,17 @@ def read(path: str | os.PathLike[str], /) -> "Run | Comparison":
 def _summary(trace: Trace, metrics: Mapping[str, float | None]) -> dict[str, Any]:
     """What a lone recording says of its run."""
     scenario = trace.meta.scenario
+    each = {
+        arm: {"controller": trace.of(arm).meta.controller, **verdict.to_dict()}
+        for arm, verdict in judge_each(trace, metrics).items()
+    }
     return {
         "scenario": scenario["name"],
-        "controller": scenario["controller"]["name"],
+        "controller": trace.meta.controller,
         "seed": scenario["seed"],
         "outcome": trace.meta.ending.to_dict(),
         **judge(trace, metrics).to_dict(),
         "metrics": dict(metrics),
+        **({"arms": each} if each else {}),
         "provenance": {},
     }

@@ -8,11 +8,13 @@ from typing import TYPE_CHECKING, Any
 
 from surgsim.api.metrics import Metrics
 from surgsim.display import WIDTH, html_title
-from surgsim.errors import RecordingError
+from surgsim.errors import RecordingError, SurgsimError
+from surgsim.metrics.catalog import of_one_arm
 from surgsim.recording.contents import check_contents
 from surgsim.recording.read import read_recording
 from surgsim.recording.sealed import read_sealed
-from surgsim.scenario.load import load_scenario
+from surgsim.scenario.arms import ArmsScenario, Experiment
+from surgsim.scenario.load import load_experiment
 from surgsim.scenario.schema import Scenario
 from surgsim.trace.trace import Trace
 from surgsim.verdict import Held, Verdict
@@ -48,7 +50,7 @@ class Run:
         self,
         summary: Mapping[str, Any],
         *,
-        scenario: Scenario | None = None,
+        scenario: Experiment | None = None,
         trace: Trace | None = None,
         folder: Path | None = None,
         keeper: object = None,
@@ -119,12 +121,34 @@ class Run:
 
         Raises:
             ScenarioError: If that of the folder does not load in this installation.
+            SurgsimError: If it has several arms: each of `arms` has a scenario of its own.
         """
+        found = self._experiment
+        if isinstance(found, ArmsScenario):
+            raise SurgsimError(f"{self.name} has several arms: ask for arms['{found.names[0]}'].scenario")
+        return found
+
+    @cached_property
+    def _experiment(self) -> Experiment:
         if self._scenario is not None:
             return self._scenario
-        return load_scenario(
-            self.trace.meta.scenario if self.folder is None else self.folder / "scenario.yaml"
-        )
+        source: Any = self.trace.meta.scenario if self.folder is None else self.folder / "scenario.yaml"
+        return load_experiment(source)
+
+    @cached_property
+    def arms(self) -> Mapping[str, "Run"]:
+        """Of several arms each one's part as a run of its own, by the arm's name; else empty."""
+        whole = self._experiment if "arms" in self._summary else None
+        if not isinstance(whole, ArmsScenario):
+            return {}
+        return {
+            arm: Run(
+                {**self._summary, **told, "metrics": of_one_arm(self._summary["metrics"], arm), "arms": {}},
+                scenario=whole.of(arm),
+                trace=self.trace.of(arm),
+            )
+            for arm, told in self._summary["arms"].items()
+        }
 
     @cached_property
     def trace(self) -> Trace:
@@ -147,7 +171,7 @@ class Run:
 
         Raises:
             RecordingError: If the run was not recorded, or the recording is damaged.
-            SurgsimError: If matplotlib is not installed.
+            SurgsimError: If matplotlib is not installed, or the run has several arms: each of `arms` has one.
 
         Example:
             >>> import surgsim
@@ -155,6 +179,8 @@ class Run:
             >>> [axes.get_ylabel() for axes in figure.axes]
             ['y [mm]', 'tip error [mm]', 'RCM error [mm]']
         """
+        if self.trace.arms:
+            raise SurgsimError(f"{self.name} has several arms: ask for arms['{self.trace.arms[0]}'].figure()")
         from surgsim.api.figure import figure_of  # matplotlib takes a while to import
 
         return figure_of(self)

@@ -6,7 +6,6 @@ from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from typing import Any
 
-from surgsim.api.loading import load
 from surgsim.api.run import Run
 from surgsim.cli.output import show_progress
 from surgsim.cli.scenario_options import naming_file
@@ -14,14 +13,15 @@ from surgsim.control.controller import ControllerConfig
 from surgsim.errors import UnreachableError
 from surgsim.runs.folder import execute, run_to_folder, summary_of_result
 from surgsim.runs.parts import check_externals
+from surgsim.scenario.arms import Experiment
 from surgsim.scenario.externals import externals_given
-from surgsim.scenario.load import Source
-from surgsim.scenario.schema import Scenario
+from surgsim.scenario.load import Source, load_experiment
+from surgsim.scenario.plain import assignments_of
 from surgsim.simulate.loop import Progress
 
 
 def run(
-    scenario: Source | Scenario,
+    scenario: Source | Experiment,
     /,
     *,
     controller: Source | ControllerConfig | None = None,
@@ -58,7 +58,8 @@ def run(
         >>> run.outcome, run.metrics["tip_error_rms_mm"] < 1.0
         ('completed', True)
     """
-    checked = load(scenario, controller=controller, seed=seed, settings=settings, **blocks)
+    assignments = assignments_of(blocks, settings)
+    checked = load_experiment(scenario, controller=controller, assignments=assignments, seed=seed)
     folder = None if out is None else Path(out)
     with externals_given(externals or {}):
         check_externals([checked])
@@ -76,6 +77,6 @@ def run(
     return Run(summary, scenario=checked, trace=result.trace, folder=folder)
 
 
-def _shown(scenario: Scenario, progress: bool) -> AbstractContextManager[Progress | None]:
+def _shown(scenario: Experiment, progress: bool) -> AbstractContextManager[Progress | None]:
     """The command's progress, or none."""
-    return show_progress(f"{scenario.name} {scenario.controller.name}") if progress else nullcontext()
+    return show_progress(f"{scenario.name} {scenario.controller_name}") if progress else nullcontext()

@@ -9,14 +9,15 @@ from surgsim.compare.choice import suite_named
 from surgsim.compare.suite import GivenConfig, SuiteConfig, with_changes
 from surgsim.control.controller import ControllerConfig
 from surgsim.errors import SurgsimError
-from surgsim.scenario.load import Source, load_controller, load_scenario
+from surgsim.scenario.arms import ArmsScenario, Experiment
+from surgsim.scenario.load import Source, load_controller, load_experiment
 from surgsim.scenario.schema import Scenario
 
 Contents = dict[str, dict[str, Any]]
 
 
 def suite_of(
-    what: Source | Scenario | Sequence[Source | Scenario],
+    what: Source | Experiment | Sequence[Source | Experiment],
     controllers: Source | ControllerConfig | Sequence[Source | ControllerConfig] | None,
 ) -> tuple[SuiteConfig, Path]:
     """The suite, with the folder of its relative paths; what has no file is kept in it.
@@ -36,7 +37,7 @@ def suite_of(
 
 def _several(given: Any, what: str) -> list[Any]:
     """`given` as a list; one alone is a list of one."""
-    single = isinstance(given, str | os.PathLike | Mapping | Scenario | ControllerConfig)
+    single = isinstance(given, str | os.PathLike | Mapping | Scenario | ArmsScenario | ControllerConfig)
     several = [given] if single else given
     if not isinstance(several, Sequence):
         raise SurgsimError(f"give {what}: a {type(given).__name__} is neither a name, a path nor a mapping")
@@ -45,11 +46,11 @@ def _several(given: Any, what: str) -> list[Any]:
     return list(several)
 
 
-def _scenario(one: Source | Scenario, contents: Contents) -> str:
+def _scenario(one: Source | Experiment, contents: Contents) -> str:
     """What the suite calls a scenario; the content of one that has no file is put into `contents`."""
     if isinstance(one, str | os.PathLike):
         return os.fspath(one)
-    checked = load_scenario(one)
+    checked = load_experiment(one)
     _put(contents, checked.name, checked.resolved(), "scenarios")
     return checked.name
 

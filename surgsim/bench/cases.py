@@ -4,12 +4,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from surgsim.errors import SurgsimError, unknown_name
-from surgsim.scenario.load import load_scenario, shipped
+from surgsim.scenario.arms import Experiment
+from surgsim.scenario.load import load_experiment, load_scenario, shipped
 from surgsim.scenario.schema import Scenario
 
 CIRCLE = "circle_lwr4plus"
 WHOLE = ("theatre_lwr4plus", "theatre_ideal_lwr4plus", "teleop_free_motion_panda")
-"""Scenarios that are measured with their own controller."""
+SEVERAL_ARMS = ("two_ports_lwr4plus",)
+"""Scenarios that are measured with their own controller, of one arm and of several."""
 KINEMATIC = ("pinv", "gradient", "vprnn", "qp")
 """Controllers that are measured on the kinematic plant too."""
 _WALL, _SENSOR = "trocar.wall={}", "disturbances=[{type: force_torque_sensor}]"
@@ -40,8 +42,17 @@ class Case:
     settings: tuple[str, ...] = ()
 
     def scenario(self, *settings: str) -> Scenario:
-        """The scenario, with further `settings`."""
+        """The scenario of one arm, with further `settings`."""
         return load_scenario(self.source, controller=self.controller, assignments=(*self.settings, *settings))
+
+    def experiment(self) -> Experiment:
+        """The scenario, of one arm or of several."""
+        return load_experiment(self.source, controller=self.controller, assignments=self.settings)
+
+    @property
+    def has_stages(self) -> bool:
+        """Whether the stages of its tick can be measured: those of one arm."""
+        return self.source not in SEVERAL_ARMS
 
 
 def circle(controller: str) -> Case:
@@ -58,7 +69,7 @@ def kinematic(controller: str) -> Case:
 
 def all_cases() -> list[Case]:
     """Every case, in the order of the tables."""
-    whole = [Case(name=name, source=name) for name in WHOLE]
+    whole = [Case(name=name, source=name) for name in (*WHOLE, *SEVERAL_ARMS)]
     controllers = [name for name in shipped("controllers") if name not in OUTSIDE]
     return [*map(circle, controllers), *whole, *map(kinematic, KINEMATIC)]
 

@@ -89,7 +89,10 @@ def _ticks(bench: Bench, report: Report) -> list[Row]:
 def _stages(bench: Bench, report: Report) -> list[Row]:
     from surgsim.bench.stages import measure_stages
 
-    return [measure_stages(case, bench.duration_s) for case in _told("stages", bench.cases, report)]
+    return [
+        measure_stages(case, bench.duration_s)
+        for case in _told("stages", [c for c in bench.cases if c.has_stages], report)
+    ]
 
 
 def _told(section: str, cases: Sequence[Case], report: Report) -> Iterator[Case]:

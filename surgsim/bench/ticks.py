@@ -8,8 +8,9 @@ import numpy as np
 from surgsim.bench.cases import Case
 from surgsim.bench.chunks import CHUNK, thread_time_of
 from surgsim.errors import SurgsimError
-from surgsim.simulate.loop import Simulation
-from surgsim.simulate.setup import Setup, prepare
+from surgsim.simulate.arms_setup import ArmsSetup
+from surgsim.simulate.loop import Simulation, prepared
+from surgsim.simulate.setup import Setup
 
 Row = dict[str, Any]
 
@@ -22,8 +23,8 @@ class BareSteps:
         ticks: Control periods of a call.
     """
 
-    def __init__(self, setup: Setup, ticks: int) -> None:
-        self._model, self._run = setup.scene.model, setup.plant.data
+    def __init__(self, setup: Setup | ArmsSetup, ticks: int) -> None:
+        self._model, self._run = setup.model, setup.data
         self._data = mujoco.MjData(self._model)
         period = setup.scenario.simulation.control_period_s
         self._steps = ticks * round(period / self._model.opt.timestep)
@@ -48,7 +49,7 @@ def measure_ticks(case: Case, duration_s: float, repeat: int) -> Row:
     Raises:
         SurgsimError: If the run ends before two chunks of ticks.
     """
-    scenario = case.scenario()
+    scenario = case.experiment()
     chunks = np.concatenate([_chunks(case, duration_s) for _ in range(repeat)])
     tick_s, step_s = np.median(chunks, axis=0)
     return {
@@ -62,7 +63,7 @@ def measure_ticks(case: Case, duration_s: float, repeat: int) -> Row:
 
 def _chunks(case: Case, duration_s: float) -> Any:
     """Time of a tick, and of the bare steps of its period, chunk by chunk (k, 2) [s]; the first warms up."""
-    setup = prepare(case.scenario())
+    setup = prepared(case.experiment())
     simulation, steps = Simulation(setup), BareSteps(setup, CHUNK)
     period = setup.scenario.simulation.control_period_s
     measured: list[tuple[float, float]] = []

@@ -28,25 +28,25 @@ def execute(options: argparse.Namespace) -> int:
     from surgsim.cli.table import print_text
     from surgsim.errors import SurgsimError
     from surgsim.runs.parts import check_externals
-    from surgsim.scenario.load import load_scenario
+    from surgsim.scenario.load import load_experiment
     from surgsim.scenario.yaml_text import dump_yaml
-    from surgsim.simulate.setup import prepare
+    from surgsim.simulate.loop import prepared
 
     wrong = 0
     for name in options.scenarios:
         try:
-            scenario = load_scenario(
+            scenario = load_experiment(
                 name, controller=options.controller, assignments=options.assignments, seed=options.seed
             )
             check_externals([scenario])
-            setup = prepare(scenario)
-            setup.controller.close()
+            setup = prepared(scenario)
+            setup.close()
         except SurgsimError as error:
             print_error(naming_file(name, error))
             wrong += 1
             continue
         if not options.quiet:
-            print(f"# {name}: ok, {setup.task.duration_s:g} s")
+            print(f"# {name}: ok, {setup.duration_s:g} s")
             print(f"# sha256 {scenario.sha256()}")
             print_text(dump_yaml(scenario.resolved()))
             print("---\n" if len(options.scenarios) > 1 else "", end="")

@@ -103,7 +103,7 @@ def _print(trace: "Trace", metrics: Mapping[str, float | None], found: list[str]
         scenario = trace.meta.scenario
         whole = {
             "scenario": scenario["name"],
-            "controller": scenario["controller"]["name"],
+            "controller": trace.meta.controller,
             "seed": scenario["seed"],
             "outcome": trace.meta.ending.to_dict(),
             **judge(trace, metrics).to_dict(),

@@ -31,6 +31,9 @@ def inspect_two(paths: list[Path], options: argparse.Namespace) -> int:
     if options.export:
         raise SurgsimError("--export takes one recording")
     pair = [read_recording(path) for path in paths]
+    for path, recorded in zip(paths, pair, strict=True):
+        if recorded.trace.arms:
+            raise SurgsimError(f"{path}: a run of several arms; two runs side by side are of one arm each")
     _print_pair(paths, pair, as_json=options.json)
     if not (options.view or options.web or options.out):
         return 0

@@ -33,30 +33,40 @@ def print_paragraphs(lines: Sequence[str]) -> None:
     print()
 
 
-def print_metrics(title: str, metrics: Mapping[str, float | None]) -> None:
-    """Print the metrics of a run with their meanings; subjects of which it defines none are left out."""
-    from surgsim.metrics.catalog import GROUPS
+def print_metrics(title: str, metrics: Mapping[str, float | None], arms: Sequence[str] = ()) -> None:
+    """Print the metrics of a run with their meanings; subjects of which it defines none are left out.
 
-    shown = [group for group in GROUPS if any(metrics.get(metric.name) is not None for metric in group)]
+    Args:
+        title: Above the table.
+        metrics: By name.
+        arms: Names of the arms where there are several: a column for each.
+    """
+    from surgsim.metrics.catalog import GROUPS, of_one_arm
+
+    columns = [of_one_arm(metrics, arm) for arm in arms] or [dict(metrics)]
     rows = [
-        (metric.name, number(metrics[metric.name], metric.digits), metric.meaning)
-        for group in shown
+        (metric.name, *(number(column[metric.name], metric.digits) for column in columns), metric.meaning)
+        for group in GROUPS
+        if any(column.get(metric.name) is not None for metric in group for column in columns)
         for metric in group
-        if metric.name in metrics
+        if all(metric.name in column for column in columns)
     ]
-    print_table(title, ("metric", "value", "meaning"), rows, right=(1,))
+    values = tuple(range(1, 1 + len(columns)))
+    print_table(title, ("metric", *(arms or ("value",)), "meaning"), rows, right=values)
 
 
 def print_run(trace: "Trace", metrics: Mapping[str, float | None]) -> None:
     """Print a run's metrics, whether its task was done, and how it ended."""
-    from surgsim.verdict import judge
+    from surgsim.verdict import judge, judge_each
 
     scenario, ending = trace.meta.scenario, trace.meta.ending
-    print_metrics(f"{scenario['name']}, {scenario['controller']['name']}, seed {scenario['seed']}", metrics)
+    title = f"{scenario['name']}, {trace.meta.controller}, seed {scenario['seed']}"
+    print_metrics(title, metrics, trace.arms)
     sentence = ending.outcome.value.removesuffix(".")
     detail = f" ({ending.detail})" if ending.detail else ""
     print()
-    print_prose(judge(trace, metrics).line())
+    for arm, verdict in judge_each(trace, metrics).items() or {"": judge(trace, metrics)}.items():
+        print_prose(f"{arm}: {verdict.line()}" if arm else verdict.line())
     print_prose(f"{ending.outcome.name.lower()} at {ending.t_s:.3f} s: {sentence}{detail}.")
 
 

@@ -4,9 +4,14 @@ import argparse
 import itertools
 import sys
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from surgsim.cli.paths import path_argument
 from surgsim.cli.scenario_options import add_scenario_options, naming_file
+
+if TYPE_CHECKING:
+    from surgsim.scenario.arms import Experiment
+    from surgsim.scenario.schema import Scenario
 
 _LIVE = ("keyboard", "gamepad")
 HELP = "run a scenario and write its folder"
@@ -57,27 +62,27 @@ def execute(options: argparse.Namespace) -> int:
     from surgsim.errors import Outcome, SurgsimError, UnreachableError
     from surgsim.runs.folder import run_to_folder
     from surgsim.runs.parts import check_externals
-    from surgsim.scenario.load import load_scenario
+    from surgsim.scenario.load import load_experiment
 
     if options.live is not None and options.operator is not None:
         raise SurgsimError(
             "--live and --operator do not go together: a person who operates sees the scene already"
         )
-    scenario = load_scenario(
+    scenario = load_experiment(
         options.scenario, controller=options.controller, assignments=options.assignments, seed=options.seed
     )
     check_externals([scenario])
     operator, record = options.operator, not options.no_record
-    name = f"{scenario.controller.name}-seed{scenario.seed}"
+    name = f"{scenario.controller_name}-seed{scenario.seed}"
     folder = options.out or _default_folder(Path("runs") / scenario.name, name, operator)
-    with show_progress(f"{scenario.name} {scenario.controller.name}", operator in _LIVE) as progress:
+    with show_progress(f"{scenario.name} {scenario.controller_name}", operator in _LIVE) as progress:
         try:
             if options.live is not None:
                 from surgsim.live.showing import run_shown
 
                 realtime = options.pace == "realtime"
                 result = run_shown(
-                    scenario,
+                    _of_one_arm(scenario, "--live"),
                     folder,
                     options.live or None,
                     realtime=realtime,
@@ -89,7 +94,9 @@ def execute(options: argparse.Namespace) -> int:
             else:
                 from surgsim.live.operate import operate
 
-                result = operate(scenario, operator, folder, record=record, progress=progress)
+                result = operate(
+                    _of_one_arm(scenario, "--operator"), operator, folder, record=record, progress=progress
+                )
         except UnreachableError as error:
             raise naming_file(options.scenario, error) from error
     ending = result.trace.meta.ending
@@ -100,6 +107,20 @@ def execute(options: argparse.Namespace) -> int:
     speed = f"{result.wall_time_s:.1f} s, {result.real_time_factor:.1f}x real time"
     print_prose(f"simulated {ending.t_s:.1f} s in {speed}; wrote {folder}", sys.stderr)
     return 0 if ending.outcome is Outcome.COMPLETED else 1
+
+
+def _of_one_arm(scenario: "Experiment", option: str) -> "Scenario":
+    """The scenario, for what shows or asks one arm alone.
+
+    Raises:
+        SurgsimError: If it has several.
+    """
+    from surgsim.errors import SurgsimError
+    from surgsim.scenario.schema import Scenario
+
+    if not isinstance(scenario, Scenario):
+        raise SurgsimError(f"{scenario.name}: {option} takes a scenario of one arm")
+    return scenario
 
 
 def _stored(file: Path) -> str:

@@ -24,7 +24,7 @@ from surgsim.runs.drafts import clear_drafts
 from surgsim.runs.exchange import restore_all
 from surgsim.runs.parts import check_externals
 from surgsim.runs.provenance import code_difference, provenance, provenance_of
-from surgsim.scenario.schema import Scenario
+from surgsim.scenario.arms import Experiment
 
 Report = Callable[[int, int, str], None]
 """Called with the runs that are done, all runs, and the last one's outcome."""
@@ -94,7 +94,7 @@ def compare(batch: Batch, report: Report | None = None, runner: Runner = run_job
     return write_table(batch.out, rows)
 
 
-def _is_to_be_kept(folder: Path, scenario: Scenario, record: bool, others: list[str]) -> bool:
+def _is_to_be_kept(folder: Path, scenario: Experiment, record: bool, others: list[str]) -> bool:
     """Whether `folder` holds the run, made by this code; if by other code, `others` gets the difference."""
     summary = _whole(folder, scenario, record)
     if summary is None:
@@ -110,7 +110,7 @@ def _is_to_be_kept(folder: Path, scenario: Scenario, record: bool, others: list[
     return same
 
 
-def is_whole(folder: Path, scenario: Scenario, record: bool) -> bool:
+def is_whole(folder: Path, scenario: Experiment, record: bool) -> bool:
     """Whether `folder` holds the run of exactly this scenario, with its recording if one is wanted.
 
     Every file of it must be as it was written.
@@ -118,7 +118,7 @@ def is_whole(folder: Path, scenario: Scenario, record: bool) -> bool:
     return _whole(folder, scenario, record) is not None
 
 
-def _whole(folder: Path, scenario: Scenario, record: bool) -> dict[str, Any] | None:
+def _whole(folder: Path, scenario: Experiment, record: bool) -> dict[str, Any] | None:
     """The summary of the run that `folder` holds, if it is whole."""
     try:
         summary = read_sealed(folder / "metrics.json")
@@ -129,13 +129,13 @@ def _whole(folder: Path, scenario: Scenario, record: bool) -> dict[str, Any] | N
         return None
 
 
-def _row(suite: SuiteConfig, spec: RunSpec, scenario: Scenario) -> Row:
+def _row(suite: SuiteConfig, spec: RunSpec, scenario: Experiment) -> Row:
     parameters: dict[str, Any] = dict(spec.parameters)
     point = "base"
     if parameters:
         text = json.dumps(parameters, sort_keys=True)
         point = hashlib.sha256(text.encode()).hexdigest()[:10]
-    run_id = f"{scenario.name}/{scenario.controller.name}/{point}-seed{spec.seed}"
+    run_id = f"{scenario.name}/{scenario.controller_name}/{point}-seed{spec.seed}"
     return Row(run_id=run_id, suite=suite.name, parameters=parameters, folder=f"runs/{run_id}")
 
 

@@ -1,5 +1,6 @@
 """One run of a batch, as a worker does it: from a scenario to a whole folder, whatever happens."""
 
+import json
 import traceback
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -8,7 +9,7 @@ from typing import Any
 from surgsim.control.external.given import given, giving
 from surgsim.errors import Outcome, SurgsimError
 from surgsim.runs.folder import execute, summary_of, whole_folder, write_run, write_summary
-from surgsim.scenario.schema import Scenario
+from surgsim.scenario.arms import Experiment, experiment_of
 from surgsim.verdict import unfinished
 
 REFUSED = "refused"
@@ -32,9 +33,9 @@ class Job:
     record: bool
     externals: tuple[tuple[str, str], ...] = field(default_factory=given)
 
-    def scenario(self) -> Scenario:
+    def scenario(self) -> Experiment:
         """The scenario."""
-        return Scenario.model_validate_json(self.scenario_json)
+        return experiment_of(json.loads(self.scenario_json))
 
 
 class DiskError(Exception):
@@ -79,7 +80,7 @@ def attempt(job: Job) -> tuple[str, str]:
         return "error", traceback.format_exc(limit=-3)
 
 
-def write_failure(scenario: Scenario, folder: Path, name: str, detail: str) -> None:
+def write_failure(scenario: Experiment, folder: Path, name: str, detail: str) -> None:
     """Write the folder of a run that gave no trace: its scenario, and an outcome without metrics.
 
     Raises:

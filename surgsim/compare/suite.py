@@ -16,9 +16,9 @@ from surgsim.compare.axis import AxisConfig, Values
 from surgsim.compare.matters import checked_matters
 from surgsim.errors import ScenarioError, SurgsimError, unknown_name
 from surgsim.metrics.catalog import METRICS
+from surgsim.scenario.arms import Experiment
 from surgsim.scenario.drawn import drawn_names
-from surgsim.scenario.load import find, load_scenario, shipped
-from surgsim.scenario.schema import Scenario
+from surgsim.scenario.load import find, load_experiment, shipped
 from surgsim.scenario.validate import validate
 from surgsim.scenario.yaml_text import read_yaml
 
@@ -145,14 +145,14 @@ class RunSpec:
     seed: int
     record: bool
 
-    def load(self) -> Scenario:
+    def load(self) -> Experiment:
         """The run's scenario.
 
         Raises:
             ScenarioError: If it is not valid.
         """
         scenario, controller = self.scenario, self.controller
-        return load_scenario(
+        return load_experiment(
             self.given.scenarios.get(scenario, scenario),
             controller=None if controller is None else self.given.controllers.get(controller, controller),
             assignments=(*self.settings, *self.assignments),
@@ -266,14 +266,14 @@ def _near(name: str, folder: Path) -> str:
     return name
 
 
-def check_runs(specs: Sequence[RunSpec]) -> list[Scenario]:
+def check_runs(specs: Sequence[RunSpec]) -> list[Experiment]:
     """The scenario of every run, each checked before any of them is run.
 
     Raises:
         ScenarioError: For the first that is not valid.
     """
-    scenarios: dict[tuple[Any, ...], Scenario] = {}
-    checked = []
+    scenarios: dict[tuple[Any, ...], Experiment] = {}
+    checked: list[Experiment] = []
     for spec in specs:
         drawn = spec.seed if spec.scenario in drawn_names() else None
         key = (spec.scenario, drawn, spec.controller, spec.assignments, spec.settings)

@@ -1,4 +1,4 @@
-"""The tidy table: one row per run, failures included."""
+"""The tidy table: one row per run, of several arms one per arm, failures included."""
 
 import hashlib
 import json
@@ -14,7 +14,7 @@ import pyarrow.parquet
 from surgsim.compare.job import OUTCOMES
 from surgsim.compare.unfinished import unfinished
 from surgsim.errors import SurgsimError, unknown_name
-from surgsim.metrics.catalog import METRICS
+from surgsim.metrics.catalog import METRICS, of_one_arm
 from surgsim.metrics.timing import TIMING_METRICS
 from surgsim.recording.files import replacing, write_file
 from surgsim.recording.sealed import read_sealed
@@ -59,8 +59,8 @@ def schema() -> pa.Schema:
     return pa.schema(fields + [pa.field(name, pa.string()) for name in texts])
 
 
-def read_row(root: Path, row: Row) -> dict[str, Any]:
-    """A run's row, read from its folder.
+def read_rows(root: Path, row: Row) -> list[dict[str, Any]]:
+    """A run's row, read from its folder; of several arms a row for each, `<scenario>.<arm>` by the scenario.
 
     Raises:
         SurgsimError: If the folder is not a whole run.
@@ -71,20 +71,13 @@ def read_row(root: Path, row: Row) -> dict[str, Any]:
         _check_summary(summary)
         outcome, provenance = summary["outcome"], summary["provenance"]
         recording = f"{row.folder}/recording.rrd"
-        return {
-            "run_id": row.run_id,
+        common = {
             "suite": row.suite,
-            "scenario": summary["scenario"],
-            "controller": summary["controller"],
             "seed": summary["seed"],
             "parameters": json.dumps(row.parameters, sort_keys=True),
             "outcome": outcome["name"],
             "outcome_t_s": outcome["t_s"],
             "outcome_detail": outcome["detail"],
-            "success": summary["success"],
-            "success_reason": summary["success_reason"],
-            "exceeded": ",".join(held["metric"] for held in summary["thresholds"] if held["exceeded"]),
-            **{name: summary["metrics"].get(name) for name in METRICS},
             "wall_time_s": provenance["wall_time_s"],
             "scenario_sha256": provenance["scenario_sha256"],
             "surgsim_version": provenance["surgsim"],
@@ -94,8 +87,33 @@ def read_row(root: Path, row: Row) -> dict[str, Any]:
             "folder": row.folder,
             "recording": recording if (root / recording).is_file() else None,
         }
+        name, metrics, arms = summary["scenario"], summary["metrics"], summary.get("arms")
+        if not arms:
+            return [{**common, **_of_arm(row.run_id, name, summary, metrics)}]
+        return [
+            {
+                **common,
+                **_of_arm(f"{row.run_id}.{arm}", f"{name}.{arm}", told, of_one_arm(metrics, arm)),
+            }
+            for arm, told in arms.items()
+        ]
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
         raise SurgsimError(f"{path} is not a run's metrics.json: {error}") from error
+
+
+def _of_arm(
+    run_id: str, scenario: str, told: Mapping[str, Any], metrics: Mapping[str, Any]
+) -> dict[str, Any]:
+    """What a row says of one arm."""
+    return {
+        "run_id": run_id,
+        "scenario": scenario,
+        "controller": told["controller"],
+        "success": told["success"],
+        "success_reason": told["success_reason"],
+        "exceeded": ",".join(held["metric"] for held in told["thresholds"] if held["exceeded"]),
+        **{name: metrics.get(name) for name in METRICS},
+    }
 
 
 def write_table(root: Path, rows: Sequence[Row]) -> pa.Table:
@@ -165,9 +183,9 @@ def _digest(table: pa.Table) -> bytes:
 
 
 def _part(root: Path, row: Row) -> pa.RecordBatch:
-    """A run's row as a table of one."""
+    """A run's rows as a table."""
     try:
-        return pa.RecordBatch.from_pylist([read_row(root, row)], schema=schema())
+        return pa.RecordBatch.from_pylist(read_rows(root, row), schema=schema())
     except (pa.ArrowException, OverflowError) as error:
         path = root / row.folder / "metrics.json"
         raise SurgsimError(f"{path} holds a value of another type: {error}") from error

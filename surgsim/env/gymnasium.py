@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from surgsim.catalog import PartConfig
 from surgsim.env.actions import Action
 from surgsim.env.environment import DECIMATION, EnvironmentState, load
-from surgsim.scenario.load import load_scenario, shipped
+from surgsim.scenario.load import load_scenario, of_one_arm, shipped
 from surgsim.scenario.schema import Scenario
 
 Array = NDArray[np.float64]
@@ -124,8 +124,8 @@ def _spelled(word: str) -> str:
 
 
 def register() -> None:
-    """Register every shipped scenario that is not registered yet."""
-    for name in shipped():
+    """Register every shipped scenario of one arm that is not registered yet."""
+    for name in of_one_arm(shipped()):
         known = environment_id(name)
         if known not in gymnasium.registry:
             gymnasium.register(known, entry_point=f"{__name__}:SurgsimEnv", kwargs={"scenario": name})

@@ -13,6 +13,7 @@ from surgsim.env.rewards import reward
 from surgsim.errors import SurgsimError, unknown_name
 from surgsim.export.subjects import BatchSubject, RunSubject, Subject
 from surgsim.recording.scene import scenario_of
+from surgsim.scenario.arms import each_arm
 from surgsim.trace.trace import Trace
 
 Array = NDArray[np.float64]
@@ -96,7 +97,7 @@ def episode_of(run: RunSubject, action: Action = "tip_velocity", rate_hz: float 
         reward=_rewards(trace, rows[1:]),
         success=run.summary.get("success"),
         task=scenario.description or scenario.name,
-        robot=scenario.robot.label,
+        robot=each_arm(scenario)[0].robot.label,
     )
 
 
@@ -155,7 +156,7 @@ def runs_of(subjects: Sequence[Subject]) -> list[RunSubject]:
     """The runs given, and every run of the batches given.
 
     Raises:
-        SurgsimError: If something else is given.
+        SurgsimError: If something else is given, or a run has several arms.
     """
     found: list[RunSubject] = []
     for subject in subjects:
@@ -165,6 +166,9 @@ def runs_of(subjects: Sequence[Subject]) -> list[RunSubject]:
             found.append(subject)
         else:
             raise SurgsimError("episodes are of runs and batches, not of a study")
+    for run in found:
+        if run.arm or run.arms:
+            raise SurgsimError(f"{run.path}: a run of several arms; episodes are of runs of one")
     return found
 
 

@@ -19,7 +19,7 @@ from surgsim.export.paper_style import (
     new_figure,
     strokes,
 )
-from surgsim.export.subjects import BatchSubject, RunSubject, Subject
+from surgsim.export.subjects import BatchSubject, RunSubject, Subject, arm_by_arm
 from surgsim.export.written import write_whole
 from surgsim.metrics.catalog import METRICS
 from surgsim.recording.polyline import drawn_rows
@@ -74,6 +74,7 @@ def write_figure(
     """
     for name in metrics:
         metric_named(name)
+    subjects = arm_by_arm(subjects)
     runs = [subject for subject in subjects if isinstance(subject, RunSubject)]
     with journal_style():
         if len(runs) == len(subjects):

@@ -25,8 +25,11 @@ def _letters(size: int) -> ImageFont.FreeTypeFont:
 
 
 def figures(trace: Trace, row: int) -> str:
-    """Time and errors at a row of the trace, in as many letters at every row."""
-    tip, rcm = _MM * trace["tip_error_m"][row], _MM * trace["rcm_error_m"][row]
+    """Time and errors at a row of the trace, of several arms the largest, in as many letters at every row."""
+    tip, rcm = (
+        _MM * float(np.fmax.reduce([one[name][row] for one in trace.each()]))
+        for name in ("tip_error_m", "rcm_error_m")
+    )
     return f"{trace['t_s'][row]:6.2f} s   tip {_error(tip)} mm   RCM {_error(rcm)} mm"
 
 

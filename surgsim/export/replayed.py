@@ -1,19 +1,18 @@
 """A recorded run as pictures: its scene, its cameras, and where everything was at a row of the trace."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 
 import numpy as np
 from numpy.typing import NDArray
 
 from surgsim.errors import SurgsimError, unknown_name
-from surgsim.models.build import build
 from surgsim.models.drawing import Drawing, FixedCamera, Line, Picture
 from surgsim.recording import palette
 from surgsim.recording.eyes import COVERS, inside_eye
 from surgsim.recording.polyline import drawn_rows
 from surgsim.recording.replay import Replay
-from surgsim.recording.scene import scenario_of
+from surgsim.recording.scene import rebuild_all, scenario_of
 from surgsim.trace.trace import Trace
 
 Array = NDArray[np.float64]
@@ -23,10 +22,13 @@ CAMERAS = {
     "port_closeup": "the port, from outside",
     "inside": "the path in the patient, from a place below the port",
     "endoscope": "from beside the shaft past the tip; it moves with the tip",
+    "lens": "what an endoscope that an arm holds sees",
 }
 """Cameras by name, and what each sees."""
 
-_THROUGH = ("inside", "endoscope")
+LENS = "lens"
+"""Name of an endoscope's camera in its file."""
+_THROUGH = ("inside", "endoscope", "lens")
 """Cameras for which what covers the patient is left out."""
 
 _ENDOSCOPE_M = np.array([0.0, 0.030, -0.075])  # from the tip, z along the shaft
@@ -56,28 +58,37 @@ class Replayed:
         trace: The run.
         replay: Puts its scene where it was.
         drawing: Draws it.
+        names: Names of the arms' cameras in the model, by what they are called here.
     """
 
-    def __init__(self, trace: Trace, replay: Replay, drawing: Drawing) -> None:
+    def __init__(self, trace: Trace, replay: Replay, drawing: Drawing, names: Mapping[str, str]) -> None:
         self.trace = trace
-        self._replay, self._drawing = replay, drawing
-        self._commanded = _line(trace.block("tip_ref"), np.arange(len(trace)), _COMMANDED, 3.0)
-        self._rows = _path_rows(trace.block("tip"))
+        self._replay, self._drawing, self._names = replay, drawing, names
+        every = np.arange(len(trace))
+        self._commanded = [_line(one.block("tip_ref"), every, _COMMANDED, 3.0) for one in trace.each()]
+        self._tips = [one.block("tip") for one in trace.each()]
+        self._rows = [_path_rows(tip) for tip in self._tips]
 
     def picture(self, row: int, camera: str, *, paths: bool = True) -> Picture:
         """What a camera saw at a row of the trace, with the path commanded and that travelled so far."""
         self._replay.place(row)
         self._replay.aim()
         hidden = COVERS if camera in _THROUGH else ()
+        name = self._names.get(camera, camera)
+        if camera == LENS and LENS not in self._names:
+            raise SurgsimError("camera 'lens': no arm of the run holds an endoscope")
         return self._drawing.picture(
-            self._replay.data, camera, hidden, self._lines(row, camera) if paths else ()
+            self._replay.data, name, hidden, self._lines(row, camera) if paths else ()
         )
 
     def _lines(self, row: int, camera: str) -> list[Line]:
         if camera == "overview":  # the patient is before them
             return []
-        rows = np.append(self._rows[self._rows < row], row)
-        return [self._commanded, _line(self.trace.block("tip"), rows, _TRAVELLED, 1.5, _LIFT)]
+        travelled = [
+            _line(tip, np.append(rows[rows < row], row), _TRAVELLED, 1.5, _LIFT)
+            for tip, rows in zip(self._tips, self._rows, strict=True)
+        ]
+        return [*self._commanded, *travelled]
 
 
 @contextmanager
@@ -99,10 +110,12 @@ def replayed(trace: Trace, width: int, height: int) -> Iterator[Replayed]:
             on_tip=True,
         ),
     )
-    config = scenario.scene.model_copy(update={"theatre": True})
-    scene = build(config, [*scenario.build_parts(), *cameras])
-    with Drawing(scene.model, width, height) as drawing:
-        yield Replayed(trace, Replay(scene, trace), drawing)
+    scenes = rebuild_all(scenario, theatre=True, cameras=cameras)
+    with Drawing(scenes[0].model, width, height) as drawing:
+        names = {camera.name: scenes[0].prefix + camera.name for camera in cameras}
+        lenses = [s.prefix + LENS for s in scenes if s.parts.has_camera(LENS)]
+        names |= {LENS: lenses[0]} if lenses else {}
+        yield Replayed(trace, Replay(scenes, trace), drawing, names)
 
 
 def _path_rows(points: Array) -> NDArray[np.intp]:

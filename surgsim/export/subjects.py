@@ -2,12 +2,13 @@
 
 import shlex
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 from surgsim.errors import RecordingError, SurgsimError, unknown_name
+from surgsim.metrics.catalog import of_one_arm
 from surgsim.recording.contents import check_contents
 from surgsim.recording.layout import FILE_NAME
 from surgsim.recording.read import Recorded, read_recording
@@ -30,10 +31,19 @@ class RunSubject:
     Attributes:
         path: The folder or the `.rrd` file.
         summary: What `metrics.json` holds; empty for a lone recording.
+        arm: Which of several arms; empty: all.
     """
 
     path: Path
     summary: Mapping[str, Any]
+    arm: str = ""
+
+    @property
+    def arms(self) -> tuple[str, ...]:
+        """Names of its arms where there are several and it is of all of them."""
+        if self.arm:
+            return ()
+        return tuple(self.summary.get("arms", ())) if self.summary else self.trace.arms
 
     @cached_property
     def recorded(self) -> Recorded:
@@ -48,7 +58,10 @@ class RunSubject:
                 f"{self.path}: a run without recording: its metrics are there, its trace is not. "
                 f"To record it: {again}"
             )
-        return read_recording(self.path)
+        found = read_recording(self.path)
+        if not self.arm:
+            return found
+        return Recorded(trace=found.trace.of(self.arm), metrics=of_one_arm(found.metrics, self.arm))
 
     @property
     def trace(self) -> Trace:
@@ -62,17 +75,19 @@ class RunSubject:
     @property
     def metrics(self) -> Mapping[str, float | None]:
         """The metrics as stored."""
-        found: Mapping[str, float | None] = self.summary.get("metrics") or self.recorded.metrics
-        return found
+        found: Mapping[str, float | None] = self.summary.get("metrics", {})
+        return (of_one_arm(found, self.arm) if self.arm else found) or self.recorded.metrics
 
     @cached_property
     def named(self) -> tuple[str, str, int]:
         """Scenario, controller and seed."""
         if self.summary:
-            found = self.summary
-            return str(found["scenario"]), str(found["controller"]), int(found["seed"])
-        scenario = self.trace.meta.scenario
-        return str(scenario["name"]), str(scenario["controller"]["name"]), int(scenario["seed"])
+            found, of = self.summary, self.summary["arms"][self.arm] if self.arm else self.summary
+            name, controller, seed = found["scenario"], of["controller"], found["seed"]
+        else:
+            scenario = self.trace.meta.scenario
+            name, controller, seed = scenario["name"], self.trace.meta.controller, scenario["seed"]
+        return f"{name}.{self.arm}" if self.arm else str(name), str(controller), int(seed)
 
     @property
     def outcome(self) -> str:
@@ -109,7 +124,8 @@ class BatchSubject:
         folders = {row["run_id"]: row["folder"] for row in self.results.rows}
         if run_id not in folders:
             raise SurgsimError(unknown_name(run_id, f"run of {self.path}", list(folders)[:20]))
-        return _run(self.path / folders[run_id])
+        whole = _run(self.path / folders[run_id])
+        return replace(whole, arm=run_id.rpartition(".")[2]) if whole.arms else whole
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -160,6 +176,17 @@ def find(name: str) -> Subject:
     if study := _study_of(path):
         return study
     return _run(_only_run(path))
+
+
+def arm_by_arm(subjects: Sequence[Subject]) -> list[Subject]:
+    """The subjects, a run of several arms as one for each of them."""
+    found: list[Subject] = []
+    for subject in subjects:
+        if isinstance(subject, RunSubject) and subject.arms:
+            found += [replace(subject, arm=arm) for arm in subject.arms]
+        else:
+            found.append(subject)
+    return found
 
 
 def chosen(subjects: Sequence[Subject], run_ids: Sequence[str]) -> list[Subject]:

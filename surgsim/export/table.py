@@ -10,7 +10,7 @@ from surgsim.compare.observations import Observations, metric_named
 from surgsim.compare.wording import bracket, heading_of, number
 from surgsim.errors import SurgsimError
 from surgsim.export.paper_table import WRITERS, PaperColumn, PaperTable
-from surgsim.export.subjects import BatchSubject, RunSubject, StudySubject, Subject
+from surgsim.export.subjects import BatchSubject, RunSubject, StudySubject, Subject, arm_by_arm
 from surgsim.export.written import write_whole
 from surgsim.metrics.catalog import METRICS
 from surgsim.studies.tables import Cell, format_cell
@@ -50,6 +50,7 @@ def table_of(
     """The table, see `write_table`."""
     for name in metrics:
         metric_named(name)
+    subjects = arm_by_arm(subjects)
     runs = [subject for subject in subjects if isinstance(subject, RunSubject)]
     if len(runs) == len(subjects):
         return _run_table(runs[0], metrics) if len(runs) == 1 else _runs_table(runs, metrics)

@@ -34,7 +34,7 @@ class Picture:
         self.data = mujoco.MjData(self.model)
         self.data.qpos[self._scene.qpos_ids] = setup.q_start
         mujoco.mj_kinematics(self.model, self.data)
-        self._blocks, self._places = joint_columns(self.model)
+        self._blocks, self._places = joint_columns(self._scene.parts)
         self._columns = [name for block in setup.plant.columns for name in block.columns]
         mocap = self._scene.port_mocap
         self._offset = None

@@ -71,7 +71,12 @@ class Evaluation:
 
 
 def evaluate(trace: Trace) -> Evaluation:
-    """Compute every metric of `trace`; one that raises is None, and costs no other."""
+    """Compute every metric of `trace`; one that raises is None, and costs no other.
+
+    Of several arms every metric of each, the arm's name and `_` before the metric's.
+    """
+    if trace.arms:
+        return _joined({arm: evaluate(trace.of(arm)) for arm in trace.arms})
     active = trace.active()
     values: dict[str, float | None] = {}
     undefined: dict[str, str] = {}
@@ -84,6 +89,21 @@ def evaluate(trace: Trace) -> Evaluation:
             if not isinstance(error, Undefined):
                 broken.add(name)
     return Evaluation(values=values, undefined=undefined, broken=frozenset(broken))
+
+
+def _joined(each: Mapping[str, Evaluation]) -> Evaluation:
+    """The metrics of several arms, by the arm, as one."""
+    return Evaluation(
+        values={f"{arm}_{name}": value for arm, e in each.items() for name, value in e.values.items()},
+        undefined={f"{arm}_{name}": why for arm, e in each.items() for name, why in e.undefined.items()},
+        broken=frozenset(f"{arm}_{name}" for arm, e in each.items() for name in e.broken),
+    )
+
+
+def of_one_arm(metrics: Mapping[str, float | None], arm: str) -> dict[str, float | None]:
+    """The metrics of one of several arms, by the metrics' own names."""
+    first = f"{arm}_"
+    return {name.removeprefix(first): v for name, v in metrics.items() if name.startswith(first)}
 
 
 def compute_metrics(trace: Trace) -> dict[str, float | None]:

@@ -32,6 +32,7 @@ import numpy as np
 
 from surgsim.errors import SurgsimError
 from surgsim.models.instrument import two_rods
+from surgsim.models.named import Named
 from surgsim.spatial import Array
 
 HALVES = 2
@@ -79,10 +80,12 @@ def first_frequency(rigidity: float, mass_kg: float, length_m: float) -> float:
     return FIRST_MODE * math.sqrt(rigidity / (mass_kg * length_m**3))
 
 
-def bends(model: mujoco.MjModel | mujoco.MjSpec) -> int:
+def bends(model: Named | mujoco.MjSpec) -> int:
     """Number of the shaft's joints: 0 where it is stiff."""
-    every = model.joints if isinstance(model, mujoco.MjSpec) else map(model.joint, range(model.njnt))
-    names = {joint.name for joint in every}
+    if isinstance(model, mujoco.MjSpec):
+        names = {joint.name for joint in model.joints}
+    else:
+        names = set(model.joints().values())
     return len(BEND_JOINTS) if BEND_JOINTS[0] in names else 0
 
 

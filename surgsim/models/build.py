@@ -15,17 +15,19 @@ from surgsim.models.config import RobotConfig, SceneConfig, WallConfig
 from surgsim.models.drive import DriveConfig
 from surgsim.models.graft import graft
 from surgsim.models.instrument import attach_instrument
+from surgsim.models.named import Named, prefix_of
 from surgsim.models.robot import JointLimits, home_of, joint_names, motor_names, robot_spec
 from surgsim.models.theatre import (
     CANNULA_JOINTS,
     GRAVITY_M_PER_S2,
     about_z,
     attach_patient,
+    attach_pedestal,
     attach_port,
     room_spec,
 )
 
-__all__ = ["JointLimits", "Scene", "SpecModifier", "build", "build_arm"]
+__all__ = ["JointLimits", "Scene", "SharedArm", "SpecModifier", "build", "build_arm", "build_shared"]
 
 Ids = NDArray[np.intp]
 
@@ -39,7 +41,9 @@ class SpecModifier(Protocol):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Scene:
-    """A compiled model and its ids. The model must not be changed.
+    """A compiled model and the ids of an arm in it. The model must not be changed.
+
+    Several arms may share a model, each with a scene of its own.
 
     Attributes:
         model: The compiled MuJoCo model.
@@ -59,6 +63,7 @@ class Scene:
         limits: What the joints can do.
         home: The arm's own home posture (n,) [rad]; None where it has none.
         shapes: Where forbidden contacts are looked for.
+        prefix: What stands before the arm's names in the model; empty where there is one arm.
     """
 
     model: mujoco.MjModel
@@ -77,6 +82,27 @@ class Scene:
     limits: JointLimits
     home: NDArray[np.float64] | None
     shapes: CollisionShapes
+    prefix: str = ""
+
+    @property
+    def parts(self) -> Named:
+        """What belongs to the arm, by its own names."""
+        return Named(self.model, self.prefix)
+
+
+@dataclass(frozen=True, kw_only=True)
+class SharedArm:
+    """An arm of a scene that several share.
+
+    Attributes:
+        name: What it is called.
+        config: Of the arm, with its instrument and its port.
+        modifiers: Applied in order to it before it is put into the scene; they know its own names alone.
+    """
+
+    name: str
+    config: SceneConfig
+    modifiers: Sequence[SpecModifier] = ()
 
 
 def build(config: SceneConfig, modifiers: Sequence[SpecModifier] = (), *, drawn: bool = True) -> Scene:
@@ -100,7 +126,41 @@ def build(config: SceneConfig, modifiers: Sequence[SpecModifier] = (), *, drawn:
             attach_patient(spec, config, config.trocar)
     for modifier in modifiers:
         modifier.modify(spec)
-    return _compile(spec, config)
+    return _scene(spec.compile(), config)
+
+
+def build_shared(arms: Sequence[SharedArm], *, drawn: bool = True) -> tuple[Scene, ...]:
+    """One model with several arms in one room, around one patient: a scene for each of them.
+
+    Args:
+        arms: The arms; the room is that of the first.
+        drawn: False leaves out what is only looked at; the mechanics are the same and step faster.
+
+    Raises:
+        SurgsimError: As `build`.
+    """
+    first = arms[0].config
+    theatre = first.theatre and drawn
+    spec = room_spec(first) if theatre else mujoco.MjSpec()
+    spec.compiler.discardvisual = not drawn
+    _set_options(spec, first)
+    for arm in arms:
+        own = mujoco.MjSpec()
+        own.compiler.discardvisual = not drawn
+        _add_arm(own, arm.config)
+        if arm.config.trocar is not None:
+            attach_port(own, arm.config.trocar)
+        for modifier in arm.modifiers:
+            modifier.modify(own)
+        spec.attach(own, prefix=prefix_of(arm.name), frame=spec.worldbody.add_frame())
+    if theatre:
+        for arm in arms[1:]:
+            attach_pedestal(spec, arm.config.robot)
+        host = next((arm.config for arm in arms if arm.config.trocar is not None), None)
+        if host is not None and host.trocar is not None:
+            attach_patient(spec, host, host.trocar)
+    model = spec.compile()
+    return tuple(_scene(model, arm.config, prefix_of(arm.name)) for arm in arms)
 
 
 @lru_cache(maxsize=16)
@@ -117,7 +177,7 @@ def build_arm(config: SceneConfig) -> Scene:
     _add_arm(spec, config)
     if config.robot.drives is not None:
         _appear(spec, config.robot.drives)
-    return _compile(spec, config.model_copy(update={"trocar": None}))
+    return _scene(spec.compile(), config.model_copy(update={"trocar": None}))
 
 
 def _appear(spec: mujoco.MjSpec, drives: DriveConfig) -> None:
@@ -127,11 +187,15 @@ def _appear(spec: mujoco.MjSpec, drives: DriveConfig) -> None:
         spec.joint(name).armature = inertia
 
 
-def _add_arm(spec: mujoco.MjSpec, config: SceneConfig) -> None:
+def _set_options(spec: mujoco.MjSpec, config: SceneConfig) -> None:
     spec.option.timestep = config.timestep_s
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET  # divergence must be seen
     spec.option.gravity = [0.0, 0.0, -GRAVITY_M_PER_S2]
+
+
+def _add_arm(spec: mujoco.MjSpec, config: SceneConfig) -> None:
+    _set_options(spec, config)
     drawn = not spec.compiler.discardvisual
     arm = robot_spec(config.robot, drawn=drawn)
     attach_instrument(arm, config.instrument)
@@ -142,29 +206,31 @@ def _base_frame(spec: mujoco.MjSpec, robot: RobotConfig) -> mujoco.MjsFrame:
     return spec.worldbody.add_frame(pos=robot.base_position_m, quat=about_z(robot.base_yaw_rad))
 
 
-def _compile(spec: mujoco.MjSpec, config: SceneConfig) -> Scene:
-    model = spec.compile()
+def _scene(model: mujoco.MjModel, config: SceneConfig, prefix: str = "") -> Scene:
+    """What of the compiled `model` is the arm's whose names begin with `prefix`."""
+    parts = Named(model, prefix)
     wall = None if config.trocar is None else config.trocar.wall
-    slides = [] if wall is None else [model.joint(name) for name in CANNULA_JOINTS]
-    joints = [model.joint(name) for name in joint_names(model)]
-    port = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, "port")
+    slides = [] if wall is None else [parts.joint(name) for name in CANNULA_JOINTS]
+    joints = [parts.joint(name) for name in joint_names(parts)]
+    port = parts.find(mujoco.mjtObj.mjOBJ_BODY, "port")
     return Scene(
         model=model,
         qpos_ids=_ids([joint.qposadr[0] for joint in joints]),
         dof_ids=_ids([joint.dofadr[0] for joint in joints]),
-        actuator_ids=_ids([model.actuator(name).id for name in motor_names(len(joints))]),
-        flange_site=model.site("flange").id,
-        tip_site=model.site("tip").id,
-        shaft_entry_site=model.site("shaft_entry").id,
-        trocar_site=model.site("trocar").id if port >= 0 else None,
+        actuator_ids=_ids([parts.actuator(name).id for name in motor_names(len(joints))]),
+        flange_site=parts.site("flange").id,
+        tip_site=parts.site("tip").id,
+        shaft_entry_site=parts.site("shaft_entry").id,
+        trocar_site=parts.site("trocar").id if port >= 0 else None,
         port_mocap=int(model.body_mocapid[port]) if port >= 0 else None,
         wall=wall,
         clearance_m=config.clearance_m,
         cannula_qpos_ids=_ids([slide.qposadr[0] for slide in slides]),
         cannula_dof_ids=_ids([slide.dofadr[0] for slide in slides]),
-        limits=JointLimits.of(model),
-        home=home_of(model),
-        shapes=collision_shapes(model, config),
+        limits=JointLimits.of(parts),
+        home=home_of(parts),
+        shapes=collision_shapes(parts, config),
+        prefix=prefix,
     )
 
 

@@ -17,6 +17,7 @@ from surgsim.models.adopted.collisions import ADAPTER_M, ADAPTER_RADIUS_M
 from surgsim.models.adopted.touching import NEXT_THAT_CAN_TOUCH
 from surgsim.models.config import InstrumentConfig, SceneConfig
 from surgsim.models.graft import asset
+from surgsim.models.named import Named
 from surgsim.models.robot import joint_names, link_names
 from surgsim.models.theatre import patient_place
 
@@ -51,8 +52,8 @@ class CollisionShapes:
     patient: Array
 
 
-def collision_shapes(model: mujoco.MjModel, config: SceneConfig) -> CollisionShapes:
-    """Shapes of the scene that `model` was compiled from."""
+def collision_shapes(model: Named, config: SceneConfig) -> CollisionShapes:
+    """Shapes of the arm that `config` describes, in the compiled `model`."""
     joints = len(joint_names(model))
     bodies = ("base", *link_names(joints))
     capsules = [(name, name, *capsule) for name in bodies for capsule in _capsules(model, name)]
@@ -76,20 +77,17 @@ def collision_shapes(model: mujoco.MjModel, config: SceneConfig) -> CollisionSha
     )
 
 
-def _capsules(model: mujoco.MjModel, body: str) -> list[tuple[Array, Array, float]]:
+def _capsules(model: Named, body: str) -> list[tuple[Array, Array, float]]:
     """End points (3,) [m] in the body's frame and radius [m] of the capsules of an arm's body."""
-    if mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_NUMERIC, f"capsule_{body}") < 0:
+    if model.find(mujoco.mjtObj.mjOBJ_NUMERIC, f"capsule_{body}") < 0:
         return []
     found = capsules_in(model.numeric(f"capsule_{body}").data)
     return [(*capsule.ends, capsule.radius) for capsule in found]
 
 
-def _left_out(model: mujoco.MjModel, instrument: InstrumentConfig | None) -> set[tuple[str, str]]:
+def _left_out(model: Named, instrument: InstrumentConfig | None) -> set[tuple[str, str]]:
     """Pairs that the arm's text `never_touch` names; its adapter is a short one on the flange itself."""
-    if mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_TEXT, NEVER_TOUCH) < 0:
-        return set()
-    text = model.text(NEVER_TOUCH).data
-    words = (text if isinstance(text, str) else bytes(text).decode()).strip("\0 ").split()
+    words = (model.text(NEVER_TOUCH) or "").split()
     pairs = {(one, other) for one, _, other in (word.partition("-") for word in words)}
     usual = instrument is not None and instrument.mjcf is None and instrument.holder is None
     if usual and instrument is not None and instrument.adapter_length_m <= ADAPTER_M:

@@ -307,16 +307,30 @@ class TrocarConfig(PartConfig):
         return self
 
 
+class PatientConfig(PartConfig):
+    """Where the patient lies.
+
+    Attributes:
+        position_m: Of the abdomen's centre [m].
+        yaw_rad: Turn of the patient about the vertical [rad].
+    """
+
+    position_m: Vec3
+    yaw_rad: FiniteFloat = 0.0
+
+
 class SceneConfig(PartConfig):
     """Everything that is compiled into the MuJoCo model.
 
     Attributes:
+        patient: Where the patient lies; null: so that the skin passes through the trocar, normal to its axis.
         theatre: Whether table, patient, floor and lights are in the scene (visual only).
     """
 
     robot: RobotConfig
     instrument: InstrumentConfig | None = InstrumentConfig()
     trocar: TrocarConfig | None = None
+    patient: PatientConfig | None = None
     theatre: bool = True
     timestep_s: PositiveFloat = 0.001
 

@@ -1,5 +1,8 @@
 """Still pictures of a scene, drawn without a window."""
 
+from collections.abc import Sequence
+from typing import Any, cast
+
 import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -9,13 +12,17 @@ from surgsim.models.build import Scene
 
 
 def render(
-    scene: Scene, q: ArrayLike, camera: str = "overview", width: int = 1400, height: int = 900
+    scene: Scene | Sequence[Scene],
+    q: ArrayLike | Sequence[ArrayLike],
+    camera: str = "overview",
+    width: int = 1400,
+    height: int = 900,
 ) -> NDArray[np.uint8]:
     """Draw the scene with shadows, the arm at `q`.
 
     Args:
-        scene: From `build`, with its theatre.
-        q: Joint positions (n,) [rad].
+        scene: From `build`, with its theatre; of several arms those that `build_shared` gives.
+        q: Joint positions (n,) [rad]; of several arms those of each.
         camera: Name of a camera in the scene.
         width: Pixels.
         height: Pixels.
@@ -26,13 +33,16 @@ def render(
     Raises:
         SurgsimError: If the scene has no such camera or this machine cannot draw.
     """
-    known = [scene.model.camera(i).name for i in range(scene.model.ncam)]
+    scenes, starts = ([scene], [q]) if isinstance(scene, Scene) else (list(scene), list(cast(Any, q)))
+    model = scenes[0].model
+    known = [model.camera(i).name for i in range(model.ncam)]
     if camera not in known:
         raise SurgsimError(f"camera: {unknown_name(camera, 'camera', known)}")
-    data = mujoco.MjData(scene.model)
-    data.qpos[scene.qpos_ids] = q
-    mujoco.mj_forward(scene.model, data)
-    with renderer(scene.model, width, height) as drawing:
+    data = mujoco.MjData(model)
+    for one, positions in zip(scenes, starts, strict=True):
+        data.qpos[one.qpos_ids] = positions
+    mujoco.mj_forward(model, data)
+    with renderer(model, width, height) as drawing:
         drawing.update_scene(data, camera)
         return np.array(drawing.render(), dtype=np.uint8)
 

@@ -28,13 +28,16 @@ from surgsim.models.adopted.arm import adopted
 from surgsim.models.adopted.chain import FEWEST, MOST
 from surgsim.models.config import RobotConfig
 from surgsim.models.folders import LITERAL_D2, is_shipped, named_spec
+from surgsim.models.named import Named
 from surgsim.spatial import Array
 
 
-def joint_names(model: mujoco.MjModel | mujoco.MjSpec) -> tuple[str, ...]:
+def joint_names(model: mujoco.MjModel | mujoco.MjSpec | Named) -> tuple[str, ...]:
     """Names of the arm's joints in `model`, from the base on: `joint1`, `joint2` and so on (n,)."""
-    every = model.joints if isinstance(model, mujoco.MjSpec) else map(model.joint, range(model.njnt))
-    known = {joint.name for joint in every}
+    if isinstance(model, mujoco.MjSpec):
+        known = {joint.name for joint in model.joints}
+    else:
+        known = set((model if isinstance(model, Named) else Named(model)).joints().values())
     return tuple(takewhile(known.__contains__, (f"joint{i}" for i in count(1))))
 
 
@@ -71,7 +74,7 @@ class JointLimits:
     torque_rate: Array
 
     @classmethod
-    def of(cls, model: mujoco.MjModel) -> Self:
+    def of(cls, model: Named) -> Self:
         """Limits that the compiled `model` states."""
         joints = joint_names(model)
         positions = np.array([model.joint(name).range for name in joints])
@@ -155,15 +158,15 @@ def what_is_missing(spec: mujoco.MjSpec) -> str | None:
     return None
 
 
-def home_of(model: mujoco.MjModel) -> Array | None:
+def home_of(model: Named) -> Array | None:
     """The arm's own home posture (n,) [rad], where it has one."""
-    known = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_NUMERIC, "home_rad") >= 0
+    known = model.find(mujoco.mjtObj.mjOBJ_NUMERIC, "home_rad") >= 0
     return _frozen(model.numeric("home_rad").data) if known else None
 
 
-def _optional(model: mujoco.MjModel, numeric: str, n: int) -> Array:
+def _optional(model: Named, numeric: str, n: int) -> Array:
     """The n values of `numeric`, infinite in a model without it."""
-    known = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_NUMERIC, numeric) >= 0
+    known = model.find(mujoco.mjtObj.mjOBJ_NUMERIC, numeric) >= 0
     return _frozen(model.numeric(numeric).data if known else np.full(n, np.inf))
 
 

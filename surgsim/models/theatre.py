@@ -5,7 +5,7 @@ import math
 import mujoco
 import numpy as np
 
-from surgsim.models.config import SceneConfig, TrocarConfig, WallConfig
+from surgsim.models.config import RobotConfig, SceneConfig, TrocarConfig, WallConfig
 from surgsim.models.graft import asset, graft
 from surgsim.models.surfaces import drape_mesh, inward_ellipsoid
 from surgsim.spatial import Array, unit
@@ -13,6 +13,7 @@ from surgsim.spatial import Array, unit
 GRAVITY_M_PER_S2 = 9.81
 CANNULA_JOINTS = ("cannula_x", "cannula_y", "cannula_z")
 _FREE_VIEW_M = np.array([0.5, 0.0, 0.25])  # where the cameras look when there is no trocar, from the base
+_PEDESTAL = "pedestal"  # begins the names of its geoms in the room's file
 _TUBE_INNER_SHARE = 0.88  # inner radius of the mesh `tube` before scaling
 
 
@@ -24,6 +25,26 @@ def room_spec(config: SceneConfig) -> mujoco.MjSpec:
     spec.frame("view").pos = _focus(config)
     spec.frame("room").quat = spec.frame("view").quat = about_z(_heading(config))
     return spec
+
+
+def attach_pedestal(scene: mujoco.MjSpec, robot: RobotConfig) -> None:
+    """Stand a further arm's base on a pedestal like that of the room's own."""
+    frame = scene.worldbody.add_frame(pos=robot.base_position_m)
+    for geom in list(scene.geoms):
+        if geom.name.startswith(_PEDESTAL):
+            copy = scene.worldbody.add_geom(
+                type=geom.type,
+                fromto=geom.fromto,
+                pos=geom.pos,
+                size=geom.size,
+                material=geom.material,
+                meshname=geom.meshname,
+                mass=0.0,
+                contype=0,
+                conaffinity=0,
+                group=geom.group,
+            )
+            copy.set_frame(frame)
 
 
 def attach_port(scene: mujoco.MjSpec, trocar: TrocarConfig) -> None:
@@ -78,7 +99,12 @@ def attach_patient(scene: mujoco.MjSpec, config: SceneConfig, trocar: TrocarConf
 
 
 def patient_place(config: SceneConfig, trocar: TrocarConfig, abdomen: Array) -> tuple[Array, float]:
-    """Centre (3,) [m] of the abdomen with these semi-axes (3,) [m], and its turn about the vertical [rad]."""
+    """Centre (3,) [m] of the abdomen with these semi-axes (3,) [m], and its turn about the vertical [rad].
+
+    Unless the config says where it lies, its skin passes through the trocar, normal to its axis.
+    """
+    if config.patient is not None:
+        return np.array(config.patient.position_m), config.patient.yaw_rad
     heading = _heading(config)
     axis = _rotated(unit(np.array(trocar.axis)), -heading)
     skin = _ellipsoid_point(abdomen, axis)

@@ -1,7 +1,7 @@
 """Looks for contacts that must not be: of the arm with itself, with the patient and with the table."""
 
 import math
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import mujoco
 import numpy as np
@@ -15,14 +15,17 @@ from surgsim.tick.arrays import Record, World, new
 from surgsim.tick.scratch import scratch
 from surgsim.tick.views import doubles, vector, words
 
+if TYPE_CHECKING:
+    from surgsim.plant.between import Between
+
 Array = NDArray[np.float64]
 
 SKIN_MARGIN_M = 0.1
 """How far from the port the shaft may pass the skin; nearer is the RCM limit's matter."""
 NOTHING, _BODY, _TABLE, _SKIN = -9, -1, -2, -3
-_TERNARY_STEPS = 24
-_INEXACT_M = 1e-4
+INEXACT_M = 1e-4
 """More than what rounding and the ternary search leave open in a distance."""
+_TERNARY_STEPS = 24
 
 
 class Watch(Record):
@@ -97,7 +100,7 @@ class ContactWatch:
         w.has_patient = len(s.patient) > 0
         if w.has_patient:
             w.patient[:] = s.patient
-        w.reach[:] = _reach(scene)
+        w.reach[:] = reaches(scene)
 
     def look(self, p_WC: Array) -> Contact | None:
         """The first forbidden contact found, or None.
@@ -118,7 +121,7 @@ class ContactWatch:
         return Contact(detail=f"{name} touches {other}, {depth_mm:.1f} mm deep", with_patient=b < 0)
 
 
-def _reach(scene: Scene) -> Array:
+def reaches(scene: Scene) -> Array:
     """For each joint a bound of the distance from its axis to any capsule (n,) [m], in all postures."""
     model, shapes = scene.model, scene.shapes
     reach = np.zeros(len(scene.dof_ids))
@@ -162,7 +165,7 @@ def is_clear(watch: Watch, world: World) -> bool:
         )
     if not used < watch.clearance:
         _, other, _, room = forbidden_contact(watch, world.p_WC)
-        watch.clearance = room - _INEXACT_M
+        watch.clearance = room - INEXACT_M
         for i in range(world.q.size):
             watch.q[i] = world.q[i]
         for i in range(3):
@@ -178,7 +181,7 @@ def is_clear(watch: Watch, world: World) -> bool:
 
 
 @compiled
-def _place(watch: Watch, i: int, ends: Array) -> None:
+def _place(watch: "Watch | Between", i: int, ends: Array) -> None:
     """End points of a capsule, world frame."""
     body = words(watch.bodies, watch.count)[i]
     p, R = doubles(watch.xpos, watch.nbody, 3)[body], doubles(watch.xmat, watch.nbody, 9)[body]
@@ -202,14 +205,10 @@ def _into_patient(watch: Watch, i: int, p_WC: Array, ends: Array) -> None:
 
 
 @compiled
-def forbidden_contact(watch: Watch, p_WC: Array) -> tuple[int, int, float, float]:
-    """Capsule, what it touches and how deep [m], for a port at `p_WC` (3,) [m]; `NOTHING`: all is well.
-
-    The last number is the room that is left [m], 0 where something touches.
-    """
+def touching_pair(watch: "Watch | Between") -> tuple[int, int, float, float]:
+    """The first pair of capsules that touch, how deep [m], and the room left, as `forbidden_contact`."""
     ends, radii = doubles(watch.ends, 2 * watch.count, 3), vector(watch.radii, watch.count)
-    pairs, shaft, patient = words(watch.pairs, 2 * watch.pair_count), watch.shaft, watch.patient
-    room = math.inf
+    pairs, room = words(watch.pairs, 2 * watch.pair_count), math.inf
     for i in range(watch.count):
         _place(watch, i, ends)
     for m in range(watch.pair_count):
@@ -219,8 +218,20 @@ def forbidden_contact(watch: Watch, p_WC: Array) -> tuple[int, int, float, float
         if square < reach * reach:
             return i, j, reach - math.sqrt(square), 0.0
         room = min(room, math.sqrt(square) - reach)
-    if not watch.has_patient:
-        return 0, NOTHING, 0.0, room
+    return 0, NOTHING, 0.0, room
+
+
+@compiled
+def forbidden_contact(watch: Watch, p_WC: Array) -> tuple[int, int, float, float]:
+    """Capsule, what it touches and how deep [m], for a port at `p_WC` (3,) [m]; `NOTHING`: all is well.
+
+    The last number is the room that is left [m], 0 where something touches.
+    """
+    ends, radii = doubles(watch.ends, 2 * watch.count, 3), vector(watch.radii, watch.count)
+    shaft, patient = watch.shaft, watch.patient
+    i, j, depth, room = touching_pair(watch)
+    if j != NOTHING or not watch.has_patient:
+        return i, j, depth, room
     for i in range(2, watch.count):
         _into_patient(watch, i, p_WC, ends)
         p0, p1 = ends[2 * i], ends[2 * i + 1]

@@ -1,6 +1,5 @@
 """Dynamic plant: MuJoCo's rigid-body dynamics under joint torques."""
 
-import math
 from collections.abc import Sequence
 from functools import partial
 from typing import Any, Literal
@@ -16,39 +15,30 @@ from surgsim.compiled import address_of, as_parameter, compiled
 from surgsim.errors import SurgsimError
 from surgsim.models.build import Scene
 from surgsim.plant.base import Plant
-from surgsim.plant.bore import Bore, act, drag, wall_force
 from surgsim.plant.contacts import ContactWatch
 from surgsim.plant.ledger import EnergyLedger, after_step, before_step, fill_terms
 from surgsim.plant.other_joints import joint_columns
 from surgsim.plant.part import BLOCK_TICKS, PlantPart
+from surgsim.plant.period import advance_dynamics, begin, look
 from surgsim.plant.port import forget, new_bore
 from surgsim.plant.records import world_of
-from surgsim.plant.shaft import see_bent
 from surgsim.plant.state import State
 from surgsim.plant.truth import NOWHERE, Truth
 from surgsim.plant.world import (
-    ACTUATE,
     AFTER_STEP,
     BEFORE_STEP,
-    GRIP,
     KINDS,
-    PORT_MOTION,
-    PUSH,
-    SENSE,
     VALUES,
     Hook,
-    Hooks,
     HookTable,
     advance_signature,
-    call_hooks,
     hook_call,
     measured,
     overrides,
 )
 from surgsim.tick.arrays import World
-from surgsim.tick.mujoco_calls import mj_rnePostConstraint, mj_step1, mj_step2
 from surgsim.tick.status import GOES_ON
-from surgsim.tick.views import doubles, site_place, vector
+from surgsim.tick.views import vector
 
 Array = NDArray[np.float64]
 _FIRST_PART = 2
@@ -78,120 +68,6 @@ class DynamicPlantConfig(PartConfig):
 
 
 @compiled
-def clear_forces(world: World, bore: Bore, hooks: Hooks, t_s: float) -> int:
-    """Forces of the last step are forgotten, the port is moved to where it is at `t_s` [s]."""
-    world.step_s = t_s
-    if not world.disturbed:
-        return GOES_ON
-    vector(world.xfrc_applied, 6 * world.nbody)[:] = 0.0
-    vector(world.qfrc_applied, world.nv)[:] = 0.0
-    world.port_offset[:] = 0.0
-    world.port_velocity[:] = 0.0
-    status = call_hooks(PORT_MOTION, hooks, world)
-    if world.mocap >= 0:
-        place = vector(world.mocap_pos + 24 * world.mocap, 3)
-        for i in range(3):
-            place[i] = world.port_home[i] + world.port_offset[i]
-    if world.walled and status == GOES_ON:
-        drag(bore, world)
-    return status
-
-
-@compiled
-def look(world: World, bore: Bore, hooks: Hooks) -> int:
-    """Fill what is true and what is measured, after `mj_step1`."""
-    see_arm(world)
-    see_bent(world, bore.bends)
-    for i in range(3):
-        world.f_T_m[i] = world.f_T[i]
-    if world.walled:
-        wall_force(bore, world, world.f_C)
-    for i in range(world.q.size):
-        world.tau_m[i] = world.tau[i]
-    status = call_hooks(VALUES, hooks, world)
-    return status if status != GOES_ON else call_hooks(SENSE, hooks, world)
-
-
-@compiled
-def see_arm(world: World) -> None:
-    """Fill joints, tip, shaft and trocar, true and as measured without error."""
-    qpos, qvel = vector(world.qpos, world.nq), vector(world.qvel, world.nv)
-    for i in range(world.q.size):
-        world.q[i] = world.q_m[i] = qpos[world.first_qpos + i]
-        world.v[i] = world.v_m[i] = qvel[world.first_dof + i]
-    tip, wrist = site_place(world, world.tip), site_place(world, world.entry)
-    for i in range(3):
-        world.p_WT[i], world.p_WR[i] = tip[i], wrist[i]
-        world.p_WC[i] = math.nan if world.trocar < 0 else site_place(world, world.trocar)[i]
-        world.p_WC_m[i], world.v_WC_m[i] = world.p_WC[i], 0.0
-    world.tracked_samples = 0
-
-
-@compiled
-def begin(world: World, bore: Bore, hooks: Hooks) -> int:
-    """The first instant of a run: the arm at rest is held by the torques that it needs."""
-    status = clear_forces(world, bore, hooks, 0.0)
-    if status != GOES_ON:
-        return status
-    mj_step1(world.mj_model, world.mj_data)
-    gravity = vector(world.qfrc_bias, world.nv)
-    for i in range(world.q.size):
-        world.tau[i] = gravity[world.first_dof + i]
-    return look(world, bore, hooks)
-
-
-@compiled
-def advance_dynamics(world: World, bore: Bore, hooks: Hooks) -> int:
-    """Let `world.torque`, saturated at the limits, act for one control period.
-
-    A hook that does not go on ends it there: nothing further is stepped or called.
-    """
-    m, d, ctrl = world.mj_model, world.mj_data, vector(world.ctrl, world.first_ctrl + world.q.size)
-    for i in range(world.q.size):
-        world.torque[i] = min(max(world.torque[i], -world.tau_max[i]), world.tau_max[i])
-    status = call_hooks(ACTUATE, hooks, world)
-    if status == GOES_ON:
-        status = call_hooks(GRIP, hooks, world)
-    if status != GOES_ON:
-        return status
-    for i in range(world.q.size):
-        world.tau[i] = ctrl[world.first_ctrl + i] = world.torque[i]
-    start = world.tick * world.dt_s
-    for k in range(world.substeps):
-        t = start + k * world.timestep_s
-        if k > 0:
-            status = clear_forces(world, bore, hooks, t)
-            if status != GOES_ON:
-                return status
-            mj_step1(m, d)
-        world.step_s = t
-        status = call_hooks(PUSH, hooks, world)
-        if status != GOES_ON:
-            return status
-        if world.walled:
-            act(bore, world)
-        status = call_hooks(BEFORE_STEP, hooks, world)
-        if status != GOES_ON:
-            return status
-        mj_step2(m, d)
-        status = call_hooks(AFTER_STEP, hooks, world)
-        if status != GOES_ON:
-            return status
-    if world.touched and world.jaws >= 0:
-        mj_rnePostConstraint(m, d)
-        wrench = doubles(world.cfrc_ext, world.nbody, 6)[world.jaws]
-        for i in range(3):
-            world.f_T[i] = wrench[3 + i]
-    world.tick += 1
-    world.t_s = world.tick * world.dt_s
-    status = clear_forces(world, bore, hooks, world.t_s)
-    if status != GOES_ON:
-        return status
-    mj_step1(m, d)
-    return look(world, bore, hooks)
-
-
-@compiled
 def _own_values(gains: Array, world: World, memory: Array, out: Array) -> int:
     """Forces on wall and tip, and the positions of the joints whose places in `qpos` are the gains."""
     k = 0
@@ -214,7 +90,8 @@ class DynamicPlant:
 
     `mj_step1`, control and other forces, `mj_step2`: the controller sees kinematics and velocities of the
     present state, which a plain `mj_step` would leave one step old. The period itself is the kernel
-    `advance_dynamics`; this builds its arrays, starts the parts and calls it.
+    `advance_dynamics`; this builds its arrays, starts the parts and calls it. One of several arms is given
+    the `data` that all share, and goes through the period with the others (`surgsim.plant.several`).
 
     Attributes:
         world: The arrays of the plant.
@@ -230,9 +107,10 @@ class DynamicPlant:
         seed: np.random.SeedSequence | None = None,
         *,
         energy_ledger: bool = False,
+        data: mujoco.MjData | None = None,
     ) -> None:
         self._scene = scene
-        self._data = mujoco.MjData(scene.model)
+        self._data = mujoco.MjData(scene.model) if data is None else data
         self._parts = tuple(parts)
         self._seed = seed or np.random.SeedSequence(0)
         self._touched = any(part.touches_tip for part in parts)
@@ -249,9 +127,14 @@ class DynamicPlant:
         for part in self._parts:
             part.attach(scene, control_period_s)
         self._drawn_at = np.full(1, -1.0)
-        self._joint_columns, places = joint_columns(scene.model)
+        self._joint_columns, places = joint_columns(scene.parts)
         self._table = self._hooks(places)
         self._contacts = ContactWatch(scene, self._data)
+
+    @property
+    def scene(self) -> Scene:
+        """The scene of its arm."""
+        return self._scene
 
     @property
     def data(self) -> mujoco.MjData:
@@ -334,17 +217,25 @@ class DynamicPlant:
 
     def reset(self, q: Array) -> State:
         """Put the arm at rest at joint positions `q` (n,) [rad], held so far by the torques that it needs."""
-        model, data, world = self._scene.model, self._data, self.world
-        mujoco.mj_resetData(model, data)
-        data.qpos[self._scene.qpos_ids] = q
+        mujoco.mj_resetData(self._scene.model, self._data)
+        self.pose(q)
+        self.forget()
+        self._told(self._begin(self.world, self.bore, self._table.record))
+        return self.state()
+
+    def pose(self, q: Array) -> None:
+        """Put the arm at joint positions `q` (n,) [rad]; nothing looks at it yet."""
+        self._data.qpos[self._scene.qpos_ids] = q
+
+    def forget(self) -> None:
+        """Forget the last run, and start the parts where the arm now is."""
+        world = self.world
         world.tick, world.t_s = 0, 0.0
         world.f_T[:] = 0.0
         self._start_parts()
         self._drawn_at[:] = -1.0
         self.refill()
         forget(self.bore)
-        self._told(self._begin(world, self.bore, self._table.record))
-        return self.state()
 
     def set_velocity(self, v: Array) -> State:
         """Let the arm move with joint velocities `v` (n,) [rad/s] from here on."""

@@ -14,8 +14,8 @@ from surgsim.models.build import Scene
 from surgsim.plant.base import Plant
 from surgsim.plant.bore import Bore
 from surgsim.plant.contacts import ContactWatch
-from surgsim.plant.dynamic import see_arm
 from surgsim.plant.part import PlantPart
+from surgsim.plant.period import see_arm
 from surgsim.plant.records import world_of
 from surgsim.plant.state import State
 from surgsim.plant.truth import Truth

@@ -5,23 +5,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surgsim.columns import AXES, Block, scalar, vector
+from surgsim.models.named import Named
 from surgsim.models.robot import joint_names
 
 Array = NDArray[np.float64]
 QUATERNION = ("w", "x", "y", "z")
 
 
-def joint_columns(model: mujoco.MjModel) -> tuple[tuple[Block, ...], NDArray[np.intp]]:
-    """Columns for the positions of every joint that is not the arm's, and their places in `qpos`.
+def joint_columns(parts: Named) -> tuple[tuple[Block, ...], NDArray[np.intp]]:
+    """Columns for the positions of every joint of `parts` that is not the arm's, and their places in `qpos`.
 
     A free joint has the columns `<name>_{x,y,z}_m` and `<name>_quat_{w,x,y,z}`, a slide `<name>_m`, a hinge
     `<name>_rad`.
     """
     blocks: list[Block] = []
     places: list[int] = []
-    arm = joint_names(model)
-    for i in range(model.njnt):
-        name = model.joint(i).name
+    arm, model = joint_names(parts), parts.model
+    for i, name in parts.joints().items():
         if name in arm:
             continue
         kind, first = model.jnt_type[i], int(model.jnt_qposadr[i])

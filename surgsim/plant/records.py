@@ -31,7 +31,7 @@ def world_of(
     world.tip, world.entry = scene.tip_site, scene.shaft_entry_site
     world.trocar = -1 if scene.trocar_site is None else scene.trocar_site
     world.mocap = -1 if scene.port_mocap is None else scene.port_mocap
-    world.jaws = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, "jaws")
+    world.jaws = scene.parts.find(mujoco.mjtObj.mjOBJ_BODY, "jaws")
     world.substeps = round(control_period_s / model.opt.timestep)
     world.disturbed, world.touched, world.walled = disturbed, touched, scene.wall is not None
     world.dt_s, world.timestep_s = control_period_s, model.opt.timestep

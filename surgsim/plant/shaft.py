@@ -113,9 +113,9 @@ def bend_joints(scene: Scene) -> int:
     Raises:
         ValueError: If they do not.
     """
-    model, count, n = scene.model, bends(scene.model), len(scene.dof_ids)
+    parts, count, n = scene.parts, bends(scene.parts), len(scene.dof_ids)
     first = int(scene.dof_ids[0])
-    ids = [int(model.joint(name).dofadr[0]) for name in BEND_JOINTS[:count]]
+    ids = [int(parts.joint(name).dofadr[0]) for name in BEND_JOINTS[:count]]
     if ids != list(range(first + n, first + n + count)):
         raise ValueError(f"the shaft's degrees of freedom {ids} do not follow the arm's")
     return count
@@ -124,7 +124,7 @@ def bend_joints(scene: Scene) -> int:
 def piece_lengths(scene: Scene) -> Array:
     """Of the pieces of a shaft that bends, from the entry on (k,) [m]."""
     model, hinges = scene.model, bend_joints(scene) // 2
-    ends = [float(model.site(piece_end(k)).pos[2]) for k in range(1, hinges + 1)]
+    ends = [float(scene.parts.site(piece_end(k)).pos[2]) for k in range(1, hinges + 1)]
     ends[0] -= float(model.site_pos[scene.shaft_entry_site][2])
     return np.array([*ends, float(model.site_pos[scene.tip_site][2])])
 
@@ -166,5 +166,5 @@ def place_on_shaft(scene: Scene, back_m: float) -> tuple[int, int, float]:
             break
         left -= length
         body = int(model.body_parentid[body])
-        site = int(model.site(piece_end(k)).id)
+        site = int(scene.parts.site(piece_end(k)).id)
     return body, site, left

@@ -52,7 +52,7 @@ class LiveView:
         rate = self._scenario.recording.scene_rate_hz * piece.meta.control_period_s
         rows = sampled_rows(len(piece), rate)
         log_signals(self._stream, piece)
-        log_poses(self._stream, self._scene, self._bodies, piece, rows, goes_on=True)
+        log_poses(self._stream, (self._scene,), self._bodies, piece, rows, goes_on=True)
         log_points(self._stream, piece, rows)
         self._desired.append(piece.block("tip_ref")[rows])
         self._actual.append(piece.block("tip")[rows])

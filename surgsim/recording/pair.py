@@ -2,12 +2,11 @@
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-import rerun as rr
 import rerun.blueprint as rrb
 
+from surgsim.recording.below import Below
 from surgsim.recording.blueprint import laid_out, texts_view
 from surgsim.recording.eyes import inside_view, scene_view
 from surgsim.recording.layout import series_path
@@ -33,7 +32,7 @@ def write_pair(path: Path, pair: Sequence[Recorded]) -> None:
     with stream_to(path, _blueprint(traces)) as stream:
         stream.send_recording_name(" | ".join(title(trace) for trace in traces))
         for side, recorded in zip(_SIDES, pair, strict=True):
-            below, trace = _Below(stream, side), recorded.trace
+            below, trace = Below(stream, side), recorded.trace
             log_signals(below, trace)
             log_scene(below, scenario_of(trace), trace)
             log_texts(below, trace.meta, recorded.metrics)
@@ -42,27 +41,7 @@ def write_pair(path: Path, pair: Sequence[Recorded]) -> None:
 def title(trace: Trace) -> str:
     """Controller, scenario and seed of a run."""
     scenario = trace.meta.scenario
-    return f"{scenario['controller']['name']} · {scenario['name']} · seed {scenario['seed']}"
-
-
-class _Below:
-    """A stream that puts every entity below `side`."""
-
-    def __init__(self, stream: rr.RecordingStream, side: str) -> None:
-        self._stream = stream
-        self._side = side
-
-    def log(self, path: str, *parts: Any, **options: Any) -> None:
-        """As the stream's."""
-        self._stream.log(f"{self._side}/{path}", *parts, **options)
-
-    def set_time(self, timeline: str, **options: Any) -> None:
-        """As the stream's."""
-        self._stream.set_time(timeline, **options)
-
-    def send_columns(self, path: str, *parts: Any, **options: Any) -> None:
-        """As the stream's."""
-        self._stream.send_columns(f"{self._side}/{path}", *parts, **options)
+    return f"{trace.meta.controller} · {scenario['name']} · seed {scenario['seed']}"
 
 
 def _blueprint(traces: Sequence[Trace]) -> rrb.Blueprint:

@@ -41,9 +41,11 @@ def plot(
     )
 
 
-def errors_plot(below: str = "", axis_y: rrb.ScalarAxis | None = None) -> rrb.TimeSeriesView:
+def errors_plot(
+    below: str = "", axis_y: rrb.ScalarAxis | None = None, name: str = "Tip blue, RCM orange [mm]"
+) -> rrb.TimeSeriesView:
     """Both errors [mm]."""
-    return plot("Tip blue, RCM orange [mm]", f"{below}{ERRORS}", axis_y=axis_y)
+    return plot(name, f"{below}{ERRORS}", axis_y=axis_y)
 
 
 def joint_plots(trace: Trace, below: str = "") -> list[rrb.Tabs]:

@@ -48,17 +48,24 @@ def read_recording(path: str | os.PathLike[str]) -> Recorded:
 
 def _fault(header: Header) -> str:
     """What every run has and this one has not, or nothing."""
-    found = {name for block in header.blocks for name in block.columns}
-    joints = max((len(block.labels) for block in header.blocks if block.name == "q"), default=1)
-    missing = [name for block in base_blocks(joints) for name in block.columns if name not in found]
-    if missing:
-        return f"it has no column '{missing[0]}'"
     scenario = header.meta.scenario
     try:
-        named = isinstance(scenario["name"], str) and isinstance(scenario["controller"]["name"], str)
+        for arm in header.meta.arms or ("",):
+            if missing := _missing(header, f"{arm}_" if arm else ""):
+                return f"it has no column '{missing}'"
+        named = isinstance(scenario["name"], str) and isinstance(header.meta.controller, str)
         return "" if named and isinstance(scenario["seed"], int) else "its scenario has no name or seed"
     except (KeyError, TypeError) as error:
         return f"its scenario is not whole: {error}"
+
+
+def _missing(header: Header, first: str) -> str | None:
+    """A column that every arm has, and the one whose columns begin with `first` has not."""
+    found = {name for block in header.blocks for name in block.columns}
+    joints = max((len(block.labels) for block in header.blocks if block.name == f"{first}q"), default=1)
+    time, *others = base_blocks(joints)
+    every = [*time.columns, *(first + name for block in others for name in block.columns)]
+    return next((name for name in every if name not in found), None)
 
 
 def _extract(file: Path) -> bytes:

@@ -1,18 +1,18 @@
 """The 3-D scene of a recording, rebuilt from the scenario and the joint positions of the trace."""
 
-import json
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import mujoco
 import numpy as np
 import rerun as rr
 
-from surgsim.models.build import Scene, build
+from surgsim.models.build import Scene, SharedArm, SpecModifier, build, build_shared
 from surgsim.recording import palette
 from surgsim.recording.layout import SCENE, TIMELINE, timestamps
 from surgsim.recording.replay import Replay
 from surgsim.recording.shapes import Triangles, geom_triangles, joined
+from surgsim.scenario.arms import ArmsScenario, Experiment, each_arm, experiment_of
 from surgsim.scenario.schema import Scenario
 from surgsim.spatial import nearest_on_line
 from surgsim.trace.trace import Array, Trace
@@ -24,9 +24,9 @@ _POINTS_PER_LINE = 2000
 _DASH_SHARE = 0.06  # length of a dash over the extent of its line
 
 
-def scenario_of(trace: Trace) -> Scenario:
+def scenario_of(trace: Trace) -> Experiment:
     """The scenario that `trace` was made from."""
-    return Scenario.model_validate_json(json.dumps(trace.meta.scenario))
+    return experiment_of(trace.meta.scenario)
 
 
 def rebuild(scenario: Scenario) -> Scene:
@@ -34,14 +34,43 @@ def rebuild(scenario: Scenario) -> Scene:
     return build(scenario.scene, scenario.build_parts())
 
 
-def log_scene(stream: rr.RecordingStream, scenario: Scenario, trace: Trace) -> None:
-    """Draw the theatre, the moving bodies, both paths, the tip and the RCM error."""
-    scene = rebuild(scenario)
-    bodies = log_shapes(stream, scene)
+def rebuild_all(
+    scenario: Experiment, *, theatre: bool = False, cameras: Sequence[SpecModifier] = ()
+) -> tuple[Scene, ...]:
+    """The scenes of the arms that were simulated, in one model.
+
+    Args:
+        scenario: What was simulated.
+        theatre: Whether the theatre is there whatever the scenario says.
+        cameras: That are added, beside the first arm.
+    """
+    arms = [
+        SharedArm(
+            name=name,
+            config=one.scene.model_copy(update={"theatre": one.theatre or theatre}),
+            modifiers=[*one.build_parts(), *(cameras if first else ())],
+        )
+        for first, name, one in _in_order(scenario)
+    ]
+    return build_shared(arms) if len(arms) > 1 else (build(arms[0].config, arms[0].modifiers),)
+
+
+def _in_order(scenario: Experiment) -> Iterator[tuple[bool, str, Scenario]]:
+    """Whether an arm is the first one, its name, and its scenario."""
+    names = scenario.names if isinstance(scenario, ArmsScenario) else ("",)
+    for name, one in zip(names, each_arm(scenario), strict=True):
+        yield name == names[0], name, one
+
+
+def log_scene(stream: rr.RecordingStream, scenario: Experiment, trace: Trace) -> None:
+    """Draw the theatre, the moving bodies, and of each arm both paths, the tip and the RCM error."""
+    scenes = rebuild_all(scenario)
+    bodies = log_shapes(stream, scenes[0])
     rows = sampled_rows(len(trace), scenario.recording.scene_rate_hz * trace.meta.control_period_s)
-    log_poses(stream, scene, bodies, trace, rows)
-    log_paths(stream, trace.block("tip_ref"), trace.block("tip"))
-    log_points(stream, trace, rows)
+    log_poses(stream, scenes, bodies, trace, rows)
+    for scene, one in zip(scenes, trace.each(), strict=True):
+        log_paths(stream, one.block("tip_ref"), one.block("tip"), scene.prefix)
+        log_points(stream, one, rows, scene.prefix)
 
 
 def log_shapes(stream: rr.RecordingStream, scene: Scene) -> dict[int, str]:
@@ -57,7 +86,7 @@ def log_shapes(stream: rr.RecordingStream, scene: Scene) -> dict[int, str]:
 
 def log_poses(
     stream: rr.RecordingStream,
-    scene: Scene,
+    scenes: Sequence[Scene],
     bodies: Mapping[int, str],
     trace: Trace,
     rows: np.ndarray[tuple[int], np.dtype[np.intp]],
@@ -68,15 +97,15 @@ def log_poses(
 
     Args:
         stream: Where to.
-        scene: The scene.
+        scenes: The scenes of the arms.
         bodies: Of `log_shapes`.
         trace: The run, or a piece of it.
         rows: Of the trace.
         goes_on: Whether further pieces follow: a body that can move is then never said to stand for good.
     """
-    poses = body_poses(scene, trace, rows)
+    poses, model = body_poses(scenes, trace, rows), scenes[0].model
     for body, path in bodies.items():
-        fixed = scene.model.body_weldid[body] == 0 and scene.model.body_mocapid[body] < 0
+        fixed = model.body_weldid[body] == 0 and model.body_mocapid[body] < 0
         _log_pose(stream, path, trace["t_s"][rows], poses, body, may_stand=fixed or not goes_on)
 
 
@@ -102,11 +131,13 @@ class Poses:
     quaternion: Array
 
 
-def body_poses(scene: Scene, trace: Trace, rows: np.ndarray[tuple[int], np.dtype[np.intp]]) -> Poses:
-    """Forward kinematics at `rows` of the trace; the port follows the trocar."""
-    replay = Replay(scene, trace)
-    position = np.empty((len(rows), scene.model.nbody, 3))
-    quaternion = np.empty((len(rows), scene.model.nbody, 4))
+def body_poses(
+    scenes: Scene | Sequence[Scene], trace: Trace, rows: np.ndarray[tuple[int], np.dtype[np.intp]]
+) -> Poses:
+    """Forward kinematics at `rows` of the trace; a port follows its trocar."""
+    replay = Replay(scenes, trace)
+    position = np.empty((len(rows), len(replay.data.xpos), 3))
+    quaternion = np.empty((len(rows), len(replay.data.xquat), 4))
     for i, row in enumerate(rows):
         replay.place(int(row))
         position[i], quaternion[i] = replay.data.xpos, replay.data.xquat
@@ -167,8 +198,11 @@ def _log_pose(
     stream.send_columns(path, [rr.TimeColumn(TIMELINE, duration=timestamps(t_s))], columns)
 
 
-def log_paths(stream: rr.RecordingStream, desired: Array, actual: Array) -> None:
-    """Both paths (rows, 3); the desired one in dashes, so that the actual one on it is seen between them."""
+def log_paths(stream: rr.RecordingStream, desired: Array, actual: Array, of: str = "") -> None:
+    """Both paths (rows, 3); the desired one in dashes, so that the actual one on it is seen between them.
+
+    `of` is what stands before the names of one of several arms.
+    """
     rows = np.unique(np.linspace(0, len(actual) - 1, _POINTS_PER_LINE).astype(np.intp))
     for name, points, color, width in (
         (DESIRED_PATH, desired, palette.SKY, 1.8),
@@ -180,7 +214,7 @@ def log_paths(stream: rr.RecordingStream, desired: Array, actual: Array) -> None
         shown = rr.LineStrips3D(
             [strip.astype(np.float32) for strip in strips], radii=rr.Radius.ui_points(width), colors=[color]
         )
-        stream.log(f"{SCENE}/{name}", shown, static=True)
+        stream.log(f"{SCENE}/{of}{name}", shown, static=True)
 
 
 def dashes(line: Array) -> list[Array]:
@@ -196,12 +230,12 @@ def dashes(line: Array) -> list[Array]:
 
 
 def log_points(
-    stream: rr.RecordingStream, trace: Trace, rows: np.ndarray[tuple[int], np.dtype[np.intp]]
+    stream: rr.RecordingStream, trace: Trace, rows: np.ndarray[tuple[int], np.dtype[np.intp]], of: str = ""
 ) -> None:
-    """The tip, and the RCM error as an arrow from the trocar to the shaft, enlarged."""
+    """The tip, and the RCM error as an arrow from the trocar to the shaft; `of` as in `log_paths`."""
     times = [rr.TimeColumn(TIMELINE, duration=timestamps(trace["t_s"][rows]))]
     tip, trocar = trace.block("tip")[rows], trace.block("trocar")[rows]
-    point, arrow = f"{SCENE}/tip", f"{SCENE}/rcm_error_x{RCM_ARROW_SCALE:g}"
+    point, arrow = f"{SCENE}/{of}tip", f"{SCENE}/{of}rcm_error_x{RCM_ARROW_SCALE:g}"
     stream.log(
         point,
         rr.Points3D.from_fields(colors=[palette.VERMILION], radii=rr.Radius.ui_points(2.5)),

@@ -11,6 +11,7 @@ import rerun as rr
 
 from surgsim.columns import Block
 from surgsim.recording import palette
+from surgsim.recording.below import Below
 from surgsim.recording.layout import ERRORS, KEY, LIMITS, TIMELINE, Durations, series_path, timestamps
 from surgsim.recording.plots import groups
 from surgsim.recording.polyline import drawn_rows
@@ -23,7 +24,7 @@ _SCALAR_COLORS = {
 }
 
 
-def log_signals(stream: rr.RecordingStream, trace: Trace) -> None:
+def log_signals(stream: rr.RecordingStream | Below, trace: Trace) -> None:
     """Send every block but the time, then what is derived for the plots.
 
     A piece of a run may be sent after the other.
@@ -40,7 +41,7 @@ def log_signals(stream: rr.RecordingStream, trace: Trace) -> None:
 
 
 def _draw(
-    stream: rr.RecordingStream,
+    stream: rr.RecordingStream | Below,
     path: str,
     times: Durations,
     values: Array,
@@ -55,7 +56,7 @@ def _draw(
 
 
 def _send(
-    stream: rr.RecordingStream,
+    stream: rr.RecordingStream | Below,
     path: str,
     times: list[rr.TimeColumn],
     values: Array,
@@ -86,7 +87,7 @@ def series_colors(trace: Trace) -> dict[str, list[tuple[int, int, int]]]:
     return found
 
 
-def _log_key(stream: rr.RecordingStream, count: int) -> None:
+def _log_key(stream: rr.RecordingStream | Below, count: int) -> None:
     """A point and a number for every joint, in its colour."""
     joints = range(1, count + 1)
     points = rr.Points2D(
@@ -99,7 +100,7 @@ def _log_key(stream: rr.RecordingStream, count: int) -> None:
     stream.log(KEY, points, static=True)
 
 
-def _log_limits(stream: rr.RecordingStream, trace: Trace) -> None:
+def _log_limits(stream: rr.RecordingStream | Below, trace: Trace) -> None:
     """A grey line from start to end for every distinct limit, named after its joints."""
     limits = {name: np.array(values) for name, values in trace.meta.limits.items()}
     ends = timestamps(trace["t_s"][[0, -1]] if len(trace) > 1 else trace["t_s"])

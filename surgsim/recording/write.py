@@ -7,6 +7,7 @@ import pyarrow as pa
 import rerun as rr
 
 from surgsim.errors import Outcome
+from surgsim.recording.below import Below
 from surgsim.recording.blueprint import blueprint
 from surgsim.recording.encoding import encode
 from surgsim.recording.layout import COLUMNS, HEADER, LOG, SEAL, SUMMARY, TIMELINE, Header, seal
@@ -14,7 +15,7 @@ from surgsim.recording.scene import log_scene, scenario_of
 from surgsim.recording.signals import log_signals
 from surgsim.recording.stream import stream_to
 from surgsim.recording.summary import outcome_sentence, result_markdown, scenario_markdown
-from surgsim.scenario.schema import Scenario
+from surgsim.scenario.arms import Experiment
 from surgsim.trace.trace import Trace, TraceMeta
 
 
@@ -38,14 +39,15 @@ def write_recording(path: Path, trace: Trace, metrics: Mapping[str, float | None
     with stream_to(path, blueprint(scenario, trace), recording_id=sha256[:32]) as stream:
         stream.send_recording_name(recording_name(scenario))
         log_header(stream, texts, packed, sha256)
-        log_signals(stream, trace)
+        for arm, one in zip(trace.arms or ("",), trace.each(), strict=True):
+            log_signals(Below(stream, arm) if arm else stream, one)
         log_scene(stream, scenario, trace)
         log_texts(stream, trace.meta, metrics)
 
 
-def recording_name(scenario: Scenario) -> str:
+def recording_name(scenario: Experiment) -> str:
     """What the viewer calls a run."""
-    return f"{scenario.name} · {scenario.controller.name} · seed {scenario.seed}"
+    return f"{scenario.name} · {scenario.controller_name} · seed {scenario.seed}"
 
 
 def log_header(stream: rr.RecordingStream, texts: Mapping[str, str], packed: bytes, sha256: str) -> None:

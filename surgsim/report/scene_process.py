@@ -15,10 +15,9 @@ import numpy as np
 
 from surgsim.errors import SurgsimError
 from surgsim.models.arm import ArmModel
-from surgsim.models.build import build
 from surgsim.models.picture import render
-from surgsim.scenario.load import load_scenario
-from surgsim.scenario.schema import Scenario
+from surgsim.scenario.arms import Experiment, drawn_scenes, each_arm
+from surgsim.scenario.load import load_experiment
 from surgsim.simulate.setup import beginning
 
 MOST = 2
@@ -32,9 +31,10 @@ def main(asked: Mapping[str, Any]) -> list[dict[str, Any]]:
     found: dict[str, dict[str, Any]] = {}
     for name in asked["scenarios"]:
         try:
-            scenario = load_scenario(name)
-            if scenario.robot.label not in found:
-                found[scenario.robot.label] = _scene(scenario, draw=bool(asked["draw"]))
+            scenario = load_experiment(name)
+            label = " and ".join(one.robot.label for one in each_arm(scenario))
+            if label not in found:
+                found[label] = _scene(scenario, label, draw=bool(asked["draw"]))
         except SurgsimError:
             continue  # a scenario that is no longer at hand; another may be
         if len(found) == MOST:
@@ -42,21 +42,21 @@ def main(asked: Mapping[str, Any]) -> list[dict[str, Any]]:
     return list(found.values())
 
 
-def _scene(scenario: Scenario, *, draw: bool) -> dict[str, Any]:
-    """Points of the arm at its start, the port, the tip's path, and a picture as JPEG in base64."""
-    arm = ArmModel(scenario.scene)
-    q_start, task = beginning(scenario, arm)
-    kin = arm.kinematics(q_start)
-    trocar = scenario.trocar
+def _scene(scenario: Experiment, label: str, *, draw: bool) -> dict[str, Any]:
+    """Points of the first arm at its start, the port, the tip's path, and a picture as JPEG in base64."""
+    each = each_arm(scenario)
+    begins = [beginning(one, ArmModel(one.scene)) for one in each]
+    (q_start, task), first = begins[0], each[0]
+    kin, trocar = ArmModel(first.scene).kinematics(q_start), first.trocar
     return {
         "scenario": scenario.name,
-        "robot": scenario.robot.label,
-        "base": list(scenario.robot.base_position_m),
+        "robot": label,
+        "base": list(first.robot.base_position_m),
         "joints": _points(kin.anchors_W),
         "tip": kin.p_WT.tolist(),
         "trocar": None if trocar is None else list(trocar.position_m),
         "path": _points([point for _, point in task.reach()]),
-        "picture": _picture(scenario, q_start) if draw else None,
+        "picture": _picture(scenario, [q for q, _ in begins]) if draw else None,
     }
 
 
@@ -64,13 +64,12 @@ def _points(points: Sequence[Any] | np.ndarray) -> list[list[float]]:
     return [[float(x) for x in point] for point in points]
 
 
-def _picture(scenario: Scenario, q: np.ndarray) -> str | None:
+def _picture(scenario: Experiment, starts: Sequence[np.ndarray]) -> str | None:
     """The scene as camera `overview` sees it; None where this machine cannot draw."""
     from PIL import Image
 
-    config = scenario.scene.model_copy(update={"theatre": True})
     try:
-        pixels = render(build(config), q, "overview", WIDTH, HEIGHT)
+        pixels = render(drawn_scenes(scenario), starts, "overview", WIDTH, HEIGHT)
     except SurgsimError:
         return None
     written = io.BytesIO()

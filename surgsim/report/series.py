@@ -95,7 +95,7 @@ def _first_of_each(rows: Sequence[Mapping[str, Any]], most: int) -> list[Mapping
 
 def _series(root: Path, rows: Sequence[Mapping[str, Any]]) -> Series:
     with ThreadPoolExecutor(max_workers=min(4, os.cpu_count() or 1)) as pool:
-        traces = list(pool.map(lambda row: _trace(root / row["recording"]), rows))
+        traces = list(pool.map(lambda row: _trace(root / row["recording"], row["scenario"]), rows))
     pairs = [(row, trace) for row, trace in zip(rows, traces, strict=True) if trace is not None]
     end = max((float(trace["t_s"][-1]) for _, trace in pairs), default=1.0)
     kinds: dict[bool, dict[str, dict[str, list[Array]]]] = {True: {}, False: {}}
@@ -119,9 +119,11 @@ def _series(root: Path, rows: Sequence[Mapping[str, Any]]) -> Series:
     )
 
 
-def _trace(path: Path) -> Trace | None:
+def _trace(path: Path, scenario: str) -> Trace | None:
+    """What is recorded there, of several arms that one which ends the scenario's name."""
     try:
-        return read_recording(path).trace.active()
+        trace = read_recording(path).trace.active()
+        return trace.of(scenario.rpartition(".")[2]) if trace.arms else trace
     except SurgsimError:
         return None
 

@@ -20,11 +20,11 @@ from surgsim.recording.sealed import sealed
 from surgsim.runs.drafts import draft_of
 from surgsim.runs.exchange import put_in_place, restore
 from surgsim.runs.provenance import provenance_of
-from surgsim.scenario.schema import Scenario
+from surgsim.scenario.arms import ArmsScenario, Experiment
 from surgsim.scenario.yaml_text import dump_yaml
 from surgsim.simulate.loop import Progress, simulate
 from surgsim.trace.trace import Trace
-from surgsim.verdict import Verdict, judge
+from surgsim.verdict import Verdict, judge, judge_each
 
 SCHEMA_VERSION = 2
 RUN_FILES = frozenset({"scenario.yaml", "metrics.json", "recording.rrd"})
@@ -58,7 +58,7 @@ class RunResult:
 
 
 def run_to_folder(
-    scenario: Scenario, folder: Path, *, record: bool = True, progress: Progress | None = None
+    scenario: Experiment, folder: Path, *, record: bool = True, progress: Progress | None = None
 ) -> RunResult:
     """Run `scenario` and write its folder.
 
@@ -74,7 +74,7 @@ def run_to_folder(
     return result
 
 
-def execute(scenario: Scenario, progress: Progress | None = None) -> RunResult:
+def execute(scenario: Experiment, progress: Progress | None = None) -> RunResult:
     """Run `scenario` and compute its metrics; write nothing.
 
     Raises:
@@ -92,7 +92,7 @@ def result_of(trace: Trace, wall_time_s: float) -> RunResult:
 
 
 def write_run(
-    scenario: Scenario, result: RunResult, folder: Path, *, record: bool, operator_input: str | None = None
+    scenario: Experiment, result: RunResult, folder: Path, *, record: bool, operator_input: str | None = None
 ) -> None:
     """Write a run's folder; `operator_input` is the record of a person's input, if one operated.
 
@@ -111,7 +111,7 @@ def write_run(
         write_summary(draft, scenario, summary)
 
 
-def write_summary(draft: Path, scenario: Scenario, summary: Mapping[str, Any]) -> None:
+def write_summary(draft: Path, scenario: Experiment, summary: Mapping[str, Any]) -> None:
     """Write `scenario.yaml`, then `metrics.json` with size and hash of every file in the draft."""
     write_file(draft / "scenario.yaml", dump_yaml(scenario.resolved()))
     whole = sealed({**summary, "files": contents_of(draft)})
@@ -165,29 +165,49 @@ def _named(draft: Path, folder: Path) -> Iterator[None]:
         raise SurgsimError(str(error).replace(str(draft), str(folder))) from error
 
 
-def summary_of_result(scenario: Scenario, result: RunResult) -> dict[str, Any]:
+def summary_of_result(scenario: Experiment, result: RunResult) -> dict[str, Any]:
     """The content of `metrics.json` of a finished run."""
     outcome = result.trace.meta.ending.to_dict()
-    return summary_of(scenario, outcome, result.verdict, result.metrics, result.wall_time_s, result.undefined)
+    each = judge_each(result.trace, result.metrics)
+    return summary_of(
+        scenario, outcome, result.verdict, result.metrics, result.wall_time_s, result.undefined, each
+    )
 
 
 def summary_of(
-    scenario: Scenario,
+    scenario: Experiment,
     outcome: Mapping[str, Any],
     verdict: Verdict,
     metrics: Mapping[str, float | None],
     wall_s: float,
     undefined: Mapping[str, str] | None = None,
+    each: Mapping[str, Verdict] | None = None,
 ) -> dict[str, Any]:
-    """The content of `metrics.json`; `undefined` says why, for each metric that could not be computed."""
+    """The content of `metrics.json`.
+
+    Args:
+        scenario: What was run.
+        outcome: How it ended.
+        verdict: Whether it was done.
+        metrics: By name.
+        wall_s: Wall time [s].
+        undefined: Why, for each metric that could not be computed.
+        each: The verdict on each of several arms; that on the run for those that have none.
+    """
+    arms = scenario.arms if isinstance(scenario, ArmsScenario) else ()
+    of_arms = {
+        arm.name: {"controller": arm.controller.name, **(each or {}).get(arm.name, verdict).to_dict()}
+        for arm in arms
+    }
     return {
         "schema_version": SCHEMA_VERSION,
         "scenario": scenario.name,
-        "controller": scenario.controller.name,
+        "controller": scenario.controller_name,
         "seed": scenario.seed,
         "outcome": dict(outcome),
         **verdict.to_dict(),
         "metrics": dict(metrics),
+        **({"arms": of_arms} if of_arms else {}),
         "undefined": dict(undefined or {}),
         "provenance": {**provenance_of(scenario), "wall_time_s": round(wall_s, 6)},
     }

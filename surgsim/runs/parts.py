@@ -20,10 +20,11 @@ from surgsim.metrics.outside import GROUP as METRICS
 from surgsim.models.arm import ArmModel
 from surgsim.plugins import all_offers, offers
 from surgsim.runs.sources import hash_of, package_sha256
+from surgsim.scenario.arms import Experiment, each_arm
 from surgsim.scenario.schema import Scenario
 
 
-def plugins_of(scenario: Scenario) -> dict[str, dict[str, Any]]:
+def plugins_of(scenario: Experiment) -> dict[str, dict[str, Any]]:
     """Version and hash of the sources of each other package that gave `scenario` a part, or its run a metric.
 
     A module that belongs to no installed package has no version.
@@ -41,24 +42,25 @@ def plugins_of(scenario: Scenario) -> dict[str, dict[str, Any]]:
     return dict(sorted(found.items()))
 
 
-def policies_of(scenario: Scenario) -> dict[str, str | None]:
+def policies_of(scenario: Experiment) -> dict[str, str | None]:
     """Hash of the file that each policy of `scenario` stands in; None for one that stands in no file."""
     names = {part.name for part in _parts(scenario) if isinstance(part, PolicyConfig)}
     return {name: _file_hash(_home(_policy(name))) for name in sorted(names)}
 
 
-def externals_of(scenario: Scenario) -> dict[str, dict[str, str] | None]:
+def externals_of(scenario: Experiment) -> dict[str, dict[str, str] | None]:
     """Name and version that each external controller of `scenario` declares; None if it declares nothing.
 
     One that this process has not asked yet is started and asked.
     """
     found: dict[str, dict[str, str] | None] = {}
-    for part in _parts(scenario.controller):
-        if isinstance(part, ExternalConfig | ExternalLawConfig) and part.name not in found:
-            try:
-                found[part.name] = _declared(part, scenario)
-            except SurgsimError:  # of a run that was refused for it
-                found[part.name] = None
+    for one in each_arm(scenario):
+        for part in _parts(one.controller):
+            if isinstance(part, ExternalConfig | ExternalLawConfig) and part.name not in found:
+                try:
+                    found[part.name] = _declared(part, one)
+                except SurgsimError:  # of a run that was refused for it
+                    found[part.name] = None
     return dict(sorted(found.items()))
 
 
@@ -74,13 +76,13 @@ def _declared(part: ExternalConfig | ExternalLawConfig, scenario: Scenario) -> d
     return {"name": told.name, "version": told.release}
 
 
-def check_externals(scenarios: Iterable[Scenario]) -> None:
+def check_externals(scenarios: Iterable[Experiment]) -> None:
     """Refuse scenarios with an external controller that has no command, or without one that was asked for.
 
     Raises:
         SurgsimError: For the first.
     """
-    parts = (part for scenario in scenarios for part in _parts(scenario.controller))
+    parts = (part for s in scenarios for one in each_arm(s) for part in _parts(one.controller))
     check_named(part.name for part in parts if isinstance(part, ExternalConfig | ExternalLawConfig))
 
 

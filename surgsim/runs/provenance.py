@@ -14,7 +14,7 @@ from typing import Any
 import surgsim
 from surgsim.runs.parts import externals_of, plugins_of, policies_of
 from surgsim.runs.sources import LATER_ROOMS, ROOT, sources_sha256
-from surgsim.scenario.schema import Scenario
+from surgsim.scenario.arms import Experiment
 
 _PACKAGES = ("mujoco", "numpy", "scipy", "mink", "daqp", "qpsolvers", "osqp", "rerun-sdk")
 _OF_NO_CONSEQUENCE = frozenset({"rerun-sdk"})
@@ -38,7 +38,7 @@ def provenance() -> dict[str, Any]:
     }
 
 
-def provenance_of(scenario: Scenario) -> dict[str, Any]:
+def provenance_of(scenario: Experiment) -> dict[str, Any]:
     """Provenance of a run of `scenario`: as `provenance`, with the packages that gave it a part.
 
     `code_sha256` is one hash of all that a result follows from beside its scenario: the sources of surgsim

@@ -6,12 +6,27 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 
 import numpy as np
-from pydantic import Field, NonNegativeInt, PositiveFloat, model_validator
+from pydantic import (
+    Field,
+    NonNegativeInt,
+    PositiveFloat,
+    SerializerFunctionWrapHandler,
+    model_serializer,
+    model_validator,
+)
 from pydantic_core import PydanticCustomError
 
 from surgsim.catalog import Name, PartConfig
 from surgsim.control.controller import ControllerConfig
-from surgsim.models.config import KINDS, InstrumentConfig, PerJoint, RobotConfig, SceneConfig, TrocarConfig
+from surgsim.models.config import (
+    KINDS,
+    InstrumentConfig,
+    PatientConfig,
+    PerJoint,
+    RobotConfig,
+    SceneConfig,
+    TrocarConfig,
+)
 from surgsim.models.robot import robot_joints
 from surgsim.plant import DEFAULT, PLANTS
 from surgsim.plant.base import PlantConfig
@@ -146,6 +161,7 @@ class Scenario(PartConfig):
     robot: RobotConfig
     instrument: InstrumentConfig | None = InstrumentConfig()
     trocar: TrocarConfig | None = None
+    patient: PatientConfig | None = None
     theatre: bool = True
     start: StartConfig = StartConfig()
     task: AnyTask
@@ -198,10 +214,21 @@ class Scenario(PartConfig):
             part.check(self)
         return self
 
+    @model_serializer(mode="wrap")
+    def _without_a_default_patient(self, write: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """Where the patient lies is left out where it follows from the port."""
+        every: dict[str, Any] = write(self)
+        return {key: value for key, value in every.items() if key != "patient" or value is not None}
+
     @property
     def control_period_s(self) -> float:
         """Time between control ticks [s]."""
         return self.simulation.control_period_s
+
+    @property
+    def controller_name(self) -> str:
+        """Name of the controller."""
+        return self.controller.name
 
     @property
     def has_wall(self) -> bool:
@@ -225,6 +252,7 @@ class Scenario(PartConfig):
             robot=self.robot,
             instrument=self.instrument,
             trocar=self.trocar,
+            patient=self.patient,
             theatre=self.theatre,
             timestep_s=self.simulation.timestep_s,
         )
@@ -254,7 +282,12 @@ class Scenario(PartConfig):
     def sha256(self) -> str:
         """Hash of the resolved scenario; of a file that it names the content counts, not where it stands."""
         resolved = self.resolved()
-        for part in filter(None, (resolved["robot"], resolved["instrument"])):
-            part.update({key: Path(part[key]).name for key in KINDS if key in part})
+        files_named(resolved)
         text = json.dumps(resolved, sort_keys=True, separators=(",", ":"))
         return hashlib.sha256(text.encode()).hexdigest()
+
+
+def files_named(resolved: dict[str, Any]) -> None:
+    """Let a resolved scenario, or an arm of one, name its files by their last names alone: for a hash."""
+    for part in filter(None, (resolved["robot"], resolved["instrument"])):
+        part.update({key: Path(part[key]).name for key in KINDS if key in part})

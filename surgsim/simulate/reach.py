@@ -69,7 +69,7 @@ class Reach:
         self.p_WC = None if trocar is None else np.array(trocar.position_m)
         self._axis = None if trocar is None else unit(np.array(trocar.axis))
         self._model = new(Model, n)
-        around = replace(arm.scene, shapes=collision_shapes(arm.scene.model, scene))
+        around = replace(arm.scene, shapes=collision_shapes(arm.scene.parts, scene))
         self._watch = ContactWatch(around, arm.point(self._model))
         self._low, self._high = np.array(limits.q_min), np.array(limits.q_max)
         self.joints = n - arm.rolls_shaft

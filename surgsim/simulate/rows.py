@@ -54,6 +54,10 @@ class Rows:
         places = {**self.at, **self.group}
         return np.array([places[name].start for name in names], dtype=np.int64)
 
+    def put_back(self, rows: Array) -> None:
+        """Be at the row after `rows`."""
+        self.data[: len(rows)], self.data[len(rows) :] = rows, np.nan
+
     def finish(self, count: int, meta: TraceMeta, first: int = 0) -> Trace:
         """The rows from `first` on and before `count`, with the derived columns, as a trace."""
         data = self.data[first:count].copy()

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import TypeGuard
 
+import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
@@ -45,6 +46,25 @@ class Setup:
     controller: Controller
     q_start: Array
 
+    @property
+    def model(self) -> mujoco.MjModel:
+        """MuJoCo's model."""
+        return self.scene.model
+
+    @property
+    def data(self) -> mujoco.MjData:
+        """MuJoCo's data."""
+        return self.plant.data
+
+    @property
+    def duration_s(self) -> float:
+        """How long the task lasts [s]."""
+        return self.task.duration_s
+
+    def close(self) -> None:
+        """End what the controller has running outside."""
+        self.controller.close()
+
 
 def prepare(scenario: Scenario) -> Setup:
     """Build a scenario's parts, solve the start and check that the path can be reached.
@@ -56,30 +76,43 @@ def prepare(scenario: Scenario) -> Setup:
     parts = scenario.build_parts()
     arm = ArmModel(scenario.scene)
     q_start, task = beginning(scenario, arm)
-    period = scenario.simulation.control_period_s
-    _check_length(scenario, task)
-    _check_beginnings(scenario, task)
+    check_times(scenario, task)
     try:
         scene = build(scenario.scene, parts, drawn=False)
     except ValueError as error:
         raise SurgsimError(f"{scenario.name}: MuJoCo refuses the model: {error}") from error
+    period = scenario.simulation.control_period_s
     plant = scenario.plant.build(scene, period, parts, scenario.run_seed())
-    controller = Controller(
-        scenario.controller,
-        arm,
-        dt_s=period,
-        has_trocar=scenario.trocar is not None,
-        use_torque_law=scenario.plant.uses_torque,
-    )
     return Setup(
         scenario=scenario,
         scene=scene,
         arm=arm,
         task=task,
         plant=plant,
-        controller=controller,
+        controller=controller_of(scenario, arm),
         q_start=q_start,
     )
+
+
+def controller_of(scenario: Scenario, arm: ArmModel) -> Controller:
+    """The scenario's controller of its nominal `arm`."""
+    return Controller(
+        scenario.controller,
+        arm,
+        dt_s=scenario.simulation.control_period_s,
+        has_trocar=scenario.trocar is not None,
+        use_torque_law=scenario.plant.uses_torque,
+    )
+
+
+def check_times(scenario: Scenario, task: Task) -> None:
+    """Refuse a run that is too long, and a disturbance that would never act.
+
+    Raises:
+        SurgsimError: With the reason.
+    """
+    _check_length(scenario, task)
+    _check_beginnings(scenario, task)
 
 
 def beginning(scenario: Scenario, arm: ArmModel) -> tuple[Array, Task]:

@@ -29,7 +29,7 @@ class Snapshot:
         t_s: Simulated time [s].
         records: The records, by name.
         arrays: Numbers and memories of the parts, by name.
-        rows: The rows written so far.
+        rows: The rows written so far, of each arm.
         data: MuJoCo's data.
         objects: The state of what is a Python object.
         ending: How the run ended; None while it goes on.
@@ -39,7 +39,7 @@ class Snapshot:
     t_s: float
     records: dict[str, bytes]
     arrays: dict[str, Array]
-    rows: Array
+    rows: tuple[Array, ...]
     data: mujoco.MjData
     objects: Stored
     ending: Ending | None

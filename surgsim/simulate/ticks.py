@@ -35,8 +35,8 @@ from surgsim.tick.views import numbers, vector
 
 Array = NDArray[np.float64]
 
-GOING, UNSAFE, FAILED, NOT_FINITE, DONE, TASK_TOLD, PLANT_TOLD = range(7)
-"""Why `run_ticks` came back: nothing ended, or what did."""
+GOING, UNSAFE, FAILED, NOT_FINITE, DONE, TASK_TOLD, PLANT_TOLD, ARMS_TOUCH = range(8)
+"""Why `run_ticks` came back: nothing ended, or what did; the last one is of several arms alone."""
 
 
 class Progress(Record):
@@ -238,13 +238,11 @@ def ask_task(run: Run, c: Control, world: World) -> int:
 
 
 @compiled
-def _act(run: Run, torque: Array, qdot: Array, jaw: float, world: World, bore: Bore, hooks: Hooks) -> int:
-    """Hand the command to the plant and let one period pass."""
+def _tell(world: World, torque: Array, qdot: Array, jaw: float) -> None:
+    """Hand the command to the plant."""
     for i in range(torque.size):
         world.torque[i], world.qdot[i] = torque[i], qdot[i]
     world.jaw = jaw
-    status: int = call_at(run.advance, world, bore, hooks)
-    return status
 
 
 @compiled
@@ -267,6 +265,48 @@ def _bridges(p: Progress, c: Control, world: World, status: int) -> bool:
 
 
 @compiled
+def decide_tick(
+    run: Run, c: Control, world: World, guard: Guard, stop: Stop, watch: Watch, hooks: Hooks
+) -> int:
+    """A tick up to the command that the plant is given; why the run ends with it, or `GOING`.
+
+    In the last tick of the task the plant is told too: one of several arms may have to go on.
+    """
+    p, at = run.progress, run.at
+    row = _begin_row(run, world, numbers(hooks.values))
+    _put(row, at.tip_ref, c.command.p_WTd)
+    _put_some(row, at.task, c.command.values, p.task_values)
+    if not is_safe(guard, watch, world, c.command):
+        return UNSAFE
+    measure(c.seen, world)
+    timed = world.tick % p.clock_every == 0
+    before = thread_time() if timed else math.nan
+    status = decide(c)
+    took = thread_time() - before if timed else math.nan
+    _record_belief(row, at, c)
+    if status == GOES_ON:
+        p.infeasible = 0
+        stop.begun = 0
+        _record(run, row, c, world.tau_max, took)
+        if not _is_finite(c.torque):
+            return NOT_FINITE
+        _tell(world, c.torque, c.resolved.qdot, c.command.jaw)
+        return DONE if _is_last(p, c, world) else GOING
+    row[at.infeasible] = 1.0 if _has_no_answer(status) else 0.0
+    if status == TOLD or not _bridges(p, c, world, status):
+        p.status = status
+        return FAILED
+    forget(c)  # what it remembers is not what the arm did
+    brake(stop, world)
+    _put(row, at.qdot_ref, stop.qdot)
+    _put(row, at.q_ref, stop.q)
+    if p.uses_torque:
+        _record_torque(row, at, world.tau_max, stop.torque)
+    _tell(world, stop.torque, stop.qdot, c.command.jaw)
+    return GOING
+
+
+@compiled
 def run_ticks(
     ticks: int,
     run: Run,
@@ -279,44 +319,14 @@ def run_ticks(
     hooks: Hooks,
 ) -> int:
     """Run up to `ticks` ticks; how many rows were begun. `run.progress` says why it came back."""
-    p, at = run.progress, run.at
+    p = run.progress
     p.reason = GOING
     for k in range(ticks):
-        row = _begin_row(run, world, numbers(hooks.values))
-        _put(row, at.tip_ref, c.command.p_WTd)
-        _put_some(row, at.task, c.command.values, p.task_values)
-        if not is_safe(guard, watch, world, c.command):
-            p.reason = UNSAFE
+        reason = decide_tick(run, c, world, guard, stop, watch, hooks)
+        if reason != GOING:
+            p.reason = reason
             return k + 1
-        measure(c.seen, world)
-        timed = world.tick % p.clock_every == 0
-        before = thread_time() if timed else math.nan
-        status = decide(c)
-        took = thread_time() - before if timed else math.nan
-        _record_belief(row, at, c)
-        if status == GOES_ON:
-            p.infeasible = 0
-            stop.begun = 0
-            _record(run, row, c, world.tau_max, took)
-            if not _is_finite(c.torque):
-                p.reason = NOT_FINITE
-                return k + 1
-            if _is_last(p, c, world):
-                p.reason = DONE
-                return k + 1
-            status = _act(run, c.torque, c.resolved.qdot, c.command.jaw, world, bore, hooks)
-        else:
-            row[at.infeasible] = 1.0 if _has_no_answer(status) else 0.0
-            if status == TOLD or not _bridges(p, c, world, status):
-                p.reason, p.status = FAILED, status
-                return k + 1
-            forget(c)  # what it remembers is not what the arm did
-            brake(stop, world)
-            _put(row, at.qdot_ref, stop.qdot)
-            _put(row, at.q_ref, stop.q)
-            if p.uses_torque:
-                _record_torque(row, at, world.tau_max, stop.torque)
-            status = _act(run, stop.torque, stop.qdot, c.command.jaw, world, bore, hooks)
+        status: int = call_at(run.advance, world, bore, hooks)
         if status != GOES_ON:
             p.reason, p.status = PLANT_TOLD, status
             return k + 1
@@ -328,21 +338,37 @@ def run_ticks(
 
 
 @compiled
+def brake_tick(run: Run, c: Control, world: World, stop: Stop) -> bool:
+    """A tick of the stop up to the torque that the plant is given; False if the state diverged."""
+    p, at = run.progress, run.at
+    if not (_is_finite(world.q_m) and _is_finite(world.v_m)):
+        return False
+    brake(stop, world)
+    last = vector(run.rows + 8 * run.columns * (p.rows - 1), run.columns)
+    if last[at.stopped] == 1.0:
+        _record_torque(last, at, world.tau_max, stop.torque)
+    _tell(world, stop.torque, stop.qdot, c.command.jaw)
+    return True
+
+
+@compiled
+def held_row(run: Run, world: World, stop: Stop, hooks: Hooks) -> None:
+    """The row after a tick of the stop."""
+    row = _begin_row(run, world, numbers(hooks.values))
+    row[run.at.stopped] = 1.0
+    _put(row, run.at.q_ref, stop.q)
+
+
+@compiled
 def hold_ticks(ticks: int, run: Run, c: Control, world: World, bore: Bore, stop: Stop, hooks: Hooks) -> int:
     """The stop after the outcome: rows without a command, until the state diverges; their number."""
-    p, at = run.progress, run.at
+    p = run.progress
     for k in range(ticks):
-        if not (_is_finite(world.q_m) and _is_finite(world.v_m)):
+        if not brake_tick(run, c, world, stop):
             return k
-        brake(stop, world)
-        last = vector(run.rows + 8 * run.columns * (p.rows - 1), run.columns)
-        if last[at.stopped] == 1.0:
-            _record_torque(last, at, world.tau_max, stop.torque)
-        status = _act(run, stop.torque, stop.qdot, c.command.jaw, world, bore, hooks)
+        status: int = call_at(run.advance, world, bore, hooks)
         if status != GOES_ON:
             p.reason, p.status = PLANT_TOLD, status
             return k
-        row = _begin_row(run, world, numbers(hooks.values))
-        row[at.stopped] = 1.0
-        _put(row, at.q_ref, stop.q)
+        held_row(run, world, stop, hooks)
     return ticks

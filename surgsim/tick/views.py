@@ -3,6 +3,7 @@
 import ctypes
 from typing import Any
 
+import numba
 import numpy as np
 from numba import carray, types  # type: ignore[attr-defined]
 from numba.core import cgutils
@@ -10,7 +11,7 @@ from numba.extending import intrinsic, overload
 
 from surgsim.compiled import compiled
 from surgsim.tick.algebra import cross
-from surgsim.tick.arrays import Array, Ids, Numbers, World
+from surgsim.tick.arrays import Array, Ids, Numbers, Record, World
 from surgsim.tick.scratch import scratch
 
 
@@ -22,6 +23,30 @@ def _pointer(context: Any, address: Any) -> Any:
         return builder.inttoptr(values[0], cgutils.voidptr_t)
 
     return types.voidptr(types.int64), generate
+
+
+_KEPT: dict[int, Record] = {}
+
+
+def place_of(record: Record) -> int:
+    """The address of a record, for `record_at`; whoever holds it must hold the record too."""
+    address = int(np.asarray(record.base).ctypes.data)
+    if vars(numba.config)["DISABLE_JIT"]:
+        _KEPT[address] = record
+    return address
+
+
+def record_at(address: int) -> Record:
+    """The record at an address, to be handed on to a kernel that knows its kind."""
+    return _KEPT[address]
+
+
+@overload(record_at)
+def _record_at(address: Any) -> Any:
+    def pointer(address: Any) -> Any:
+        return _pointer(address)  # type: ignore[call-arg]
+
+    return pointer
 
 
 def doubles(address: int, rows: int, columns: int) -> Array:

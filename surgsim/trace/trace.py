@@ -2,13 +2,14 @@
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from surgsim.columns import Block, joints, scalar, vector
+from surgsim.display import joined_names
 from surgsim.errors import Outcome, SurgsimError, UnknownNameError, not_held
 
 if TYPE_CHECKING:
@@ -103,7 +104,8 @@ class TraceMeta:
         scenario: The resolved scenario.
         control_period_s: Time between rows [s].
         limits: Joint limits: q_min, q_max, velocity, acceleration, torque, and where they are published jerk
-            and torque_rate; a number for each joint, SI.
+            and torque_rate; a number for each joint, SI. Where there are several arms, with the arm's name
+            and `_` before them.
         ending: How the run ended.
     """
 
@@ -111,6 +113,34 @@ class TraceMeta:
     control_period_s: float
     limits: Mapping[str, Sequence[float]]
     ending: Ending
+
+    @property
+    def arms(self) -> tuple[str, ...]:
+        """Names of the arms where there are several; else none."""
+        return tuple(str(arm["name"]) for arm in self.scenario.get("arms", ()))
+
+    @property
+    def controller(self) -> str:
+        """Name of the controller, or of those of the arms."""
+        parts = self.scenario.get("arms", (self.scenario,))
+        return joined_names(str(part["controller"]["name"]) for part in parts)
+
+    def of(self, arm: str) -> "TraceMeta":
+        """What belongs to the columns of one of several arms, as if it were alone.
+
+        Raises:
+            SurgsimError: If there is no such arm, or the scenario does not load in this installation.
+        """
+        from surgsim.scenario.arms import arms_of  # of no use to a trace of one arm, and takes a while
+
+        whole = arms_of(self.scenario)
+        first = f"{arm}_"
+        limits = {name: values for name, values in self.limits.items() if name.startswith(first)}
+        return replace(
+            self,
+            scenario=whole.of(arm).resolved(),
+            limits={name.removeprefix(first): values for name, values in limits.items()},
+        )
 
     def to_json(self) -> str:
         """The meta data as JSON."""
@@ -166,6 +196,7 @@ class Trace:
         self._data.flags.writeable = False
         self._index = {name: i for i, name in enumerate(columns)}
         self._blocks = {block.name: block for block in blocks}
+        self._each: dict[str, Trace] = {}
         self.meta = meta
 
     def __len__(self) -> int:
@@ -180,6 +211,32 @@ class Trace:
     def blocks(self) -> tuple[Block, ...]:
         """The blocks, in order."""
         return tuple(self._blocks.values())
+
+    @property
+    def arms(self) -> tuple[str, ...]:
+        """Names of the arms where there are several; else none."""
+        return self.meta.arms
+
+    def of(self, arm: str) -> "Trace":
+        """The trace of one of several arms, with the columns of a trace of one arm.
+
+        Raises:
+            SurgsimError: If there is no such arm.
+        """
+        if arm not in self.arms:
+            raise not_held(arm, "known arm of this trace", self.arms, "its arms")
+        if arm not in self._each:
+            first = f"{arm}_"
+            kept = [b for b in self.blocks if b.name == "t" or b.name.startswith(first)]
+            data = np.hstack([self.block(block.name) for block in kept])
+            data.flags.writeable = False
+            blocks = [replace(block, name=block.name.removeprefix(first)) for block in kept]
+            self._each[arm] = Trace(data, blocks, self.meta.of(arm))
+        return self._each[arm]
+
+    def each(self) -> "tuple[Trace, ...]":
+        """The traces of the arms: of one alone this trace itself."""
+        return tuple(self.of(arm) for arm in self.arms) or (self,)
 
     @property
     def joints(self) -> int:
@@ -274,9 +331,9 @@ class Trace:
     @property
     def _stopped(self) -> NDArray[np.bool_]:
         """Which rows belong to the stop (rows,)."""
-        if "stopped" not in self:
-            return np.zeros(len(self), dtype=bool)
-        return np.asarray(self["stopped"] == 1.0)
+        told = [name for name in ("stopped", *(f"{arm}_stopped" for arm in self.arms)) if name in self]
+        rows = np.array([self[name] == 1.0 for name in told], dtype=bool).reshape(-1, len(self))
+        return np.asarray(rows.any(axis=0))
 
     def _rows(self, mask: NDArray[np.bool_]) -> "Trace":
         return Trace(self._data[mask], self.blocks, self.meta)
@@ -288,5 +345,5 @@ class Trace:
         return all(
             np.array_equal(self[name], other[name], equal_nan=True)
             for name in self.columns
-            if name not in TIMING_COLUMNS
+            if not name.endswith(TIMING_COLUMNS)
         )

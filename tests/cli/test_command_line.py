@@ -11,7 +11,7 @@ import pytest
 from surgsim.bench.cases import NEEDS
 from surgsim.cli.list import KINDS
 from surgsim.cli.main import COMMANDS, main
-from surgsim.scenario.load import load_scenario, shipped
+from surgsim.scenario.load import load_experiment, load_scenario, of_one_arm, shipped
 from surgsim.simulate.setup import prepare
 from surgsim.tasks.base import PathTaskConfig
 
@@ -48,7 +48,21 @@ def _set(*assignments):
     return [word for assignment in assignments for word in ("--set", assignment)]
 
 
-@pytest.mark.parametrize("name", shipped())
+ARMS = sorted(set(shipped()) - set(of_one_arm(shipped())))
+OF_EACH = [f"arms.{k}.{key}" for k in (0, 1) for key in SHORT]
+
+
+@pytest.mark.parametrize("name", ARMS)
+def test_every_shipped_scenario_of_several_arms_runs(surgsim, name, tmp_path):
+    done = surgsim("run", name, "--no-record", "--json", "--out", "run", *_set(*OF_EACH, *SLOW_LIMITS))
+    assert done.returncode == 0, done.stderr
+    summary = json.loads(done.stdout)
+    assert (summary["scenario"], summary["outcome"]["name"]) == (name, "completed")
+    assert sorted(summary["arms"]) == sorted(load_experiment(name).names)
+    assert json.loads((tmp_path / "run" / "metrics.json").read_text()) == summary
+
+
+@pytest.mark.parametrize("name", of_one_arm(shipped()))
 def test_every_shipped_scenario_runs(surgsim, name, tmp_path):
     path = isinstance(load_scenario(name).task, PathTaskConfig)
     short = SHORT if path else SHORT[:1]

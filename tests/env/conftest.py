@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import pytest
 
-from surgsim.scenario.load import load_scenario, shipped
+from surgsim.scenario.load import load_scenario, of_one_arm, shipped
 from surgsim.scenario.schema import Scenario
 from surgsim.tasks.base import PathTaskConfig
 
@@ -42,7 +42,8 @@ def _is_second_twin(name: str) -> bool:
 @pytest.fixture(
     scope="session",
     params=[
-        pytest.param(name, marks=pytest.mark.slow) if _is_second_twin(name) else name for name in shipped()
+        pytest.param(name, marks=pytest.mark.slow) if _is_second_twin(name) else name
+        for name in of_one_arm(shipped())
     ],
 )
 def shipped_name(request) -> str:

@@ -11,7 +11,7 @@ from surgsim.models.build import Scene, build, build_arm
 from surgsim.models.config import RobotConfig, SceneConfig, TrocarConfig
 from surgsim.models.folders import arms_for_tests, named_spec, robot_names
 from surgsim.models.robot import joint_names, link_names, motor_names, robot_joints
-from surgsim.scenario.load import load_scenario, shipped
+from surgsim.scenario.load import load_scenario, of_one_arm, shipped
 
 every_robot = pytest.mark.parametrize("name", robot_names())
 every_arm = pytest.mark.parametrize("name", [*robot_names(), *arms_for_tests()])
@@ -130,7 +130,7 @@ def test_a_limit_that_no_one_publishes_is_infinite():
     assert np.isinf(limits.torque_rate).all()
 
 
-@pytest.mark.parametrize("name", [name for name in shipped() if name.endswith("_lwr4plus")])
+@pytest.mark.parametrize("name", [name for name in of_one_arm(shipped()) if name.endswith("_lwr4plus")])
 def test_every_lwr4plus_scenario_has_a_twin_on_the_panda(name):
     """The same but for the robot, its start and the place of the port; the path lies the same to the port."""
     original = load_scenario(name).resolved()

@@ -12,7 +12,7 @@ from surgsim.control.failure import ControlFailure
 from surgsim.errors import Outcome
 from surgsim.metrics.catalog import compute_metrics
 from surgsim.recording.read import read_recording
-from surgsim.scenario.load import load_scenario, shipped
+from surgsim.scenario.load import load_experiment, load_scenario, shipped
 from surgsim.simulate.loop import Simulation, simulate
 from surgsim.simulate.setup import prepare
 
@@ -45,7 +45,7 @@ def _shifted(point):
 
 def test_every_outcome_but_completion_has_a_scenario_of_its_name():
     assert set(shipped("safety")) == NAMES
-    assert all(load_scenario(f"safety/{name}").name == name for name in NAMES)
+    assert all(load_experiment(f"safety/{name}").name == name for name in NAMES)
 
 
 @pytest.mark.parametrize("name", sorted(NAMES))
@@ -61,16 +61,27 @@ def test_its_scenario_ends_in_it_on_the_command_line_and_the_recording_says_so(n
     ending = recorded.trace.meta.ending
     assert ending.outcome.name.lower() == name
     assert ending.t_s == recorded.trace.active()["t_s"][-1] > 0.1
-    assert compute_metrics(recorded.trace)["stop_distance_mm"] == printed["metrics"]["stop_distance_mm"]
+    stored = {key: value for key, value in printed["metrics"].items() if key.endswith("stop_distance_mm")}
+    assert stored
+    assert stored.items() <= compute_metrics(recorded.trace).items()
 
 
 @pytest.mark.parametrize("robot", ["lwr4plus", "panda"])
-@pytest.mark.parametrize("name", sorted(NAMES))
+@pytest.mark.parametrize("name", sorted(NAMES - {"arm_collision"}))
 def test_a_stopped_arm_comes_to_rest_and_does_not_fall(name, robot):
     assignments = _on_panda(name) if robot == "panda" else ["theatre=false"]
     trace = simulate(load_scenario(f"safety/{name}", assignments=assignments))
     assert trace.meta.ending.outcome.name.lower() == name
-    stop = trace.stop()
+    _assert_comes_to_rest(trace.stop())
+
+
+def test_every_arm_of_a_run_that_is_stopped_comes_to_rest():
+    trace = simulate(load_experiment("safety/arm_collision", assignments=["theatre=false"]))
+    for arm in trace.arms:
+        _assert_comes_to_rest(trace.of(arm).stop())
+
+
+def _assert_comes_to_rest(stop):
     assert len(stop) == 501
     speed = np.abs(stop.block("v")).max(axis=1)
     assert speed[-1] < AT_REST_RAD_PER_S

@@ -25,6 +25,23 @@ _MOST_DRAWN = 6000
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
+class ToolCamera:
+    """A camera of an instrument, as MuJoCo's: it looks along its -z, its y is up.
+
+    Attributes:
+        name: Its name in the file.
+        position: In the instrument's frame (3,) [m].
+        R: Its axes there (3, 3).
+        fovy_deg: Its field of view, from top to bottom [deg].
+    """
+
+    name: str
+    position: Array
+    R: Array
+    fovy_deg: float
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Tool:
     """An instrument from a file. Its frame has z along the shaft, towards the tip.
 
@@ -38,6 +55,7 @@ class Tool:
         inertia: Principal moments about the centre of mass (3,) [kg m²].
         R_TI: Their axes in its frame (3, 3).
         surfaces: What is drawn.
+        cameras: What it sees with.
     """
 
     p_ET: Array
@@ -49,6 +67,7 @@ class Tool:
     inertia: Array
     R_TI: Array
     surfaces: tuple[Surface, ...]
+    cameras: tuple[ToolCamera, ...] = ()
 
 
 @lru_cache(maxsize=16)
@@ -67,6 +86,7 @@ def read_tool(path: Path, entry_site: str, tip_site: str, files_sha256: str) -> 
     del files_sha256
     model = read_file(path, "mjcf").model
     data = at_zero(model)
+    mujoco.mj_camlight(model, data)
     if model.nbody < 2:
         raise AdoptionError(f"{path} has no body", "mjcf")
     root = 1
@@ -101,6 +121,16 @@ def read_tool(path: Path, entry_site: str, tip_site: str, files_sha256: str) -> 
         inertia=moments,
         R_TI=turn,
         surfaces=tuple(s for s in surfaces if s is not None and len(s.faces)),
+        cameras=tuple(
+            ToolCamera(
+                name=str(model.cam(i).name) or f"camera{i}",
+                position=R_WT.T @ (data.cam_xpos[i] - origin),
+                R=R_WT.T @ data.cam_xmat[i].reshape(3, 3),
+                fovy_deg=float(model.cam_fovy[i]),
+            )
+            for i in range(model.ncam)
+            if model.cam_bodyid[i] in bodies
+        ),
     )
 
 
@@ -134,6 +164,9 @@ def tool_spec(tool: Tool) -> mujoco.MjSpec:
     body.add_site(name="shaft_entry", pos=[0.0, 0.0, entry], group=4)
     body.add_site(name="tip", pos=[0.0, 0.0, tip], group=4)
     body.add_body(name="jaws", pos=[0.0, 0.0, tip])
+    for camera in tool.cameras:
+        turn = quaternion_of(camera.R)
+        body.add_camera(name=camera.name, pos=camera.position, quat=turn, fovy=camera.fovy_deg)
     for i, surface in enumerate(tool.surfaces):
         draw(spec, "instrument", f"instrument_{i}", coarser(surface, _MOST_DRAWN))
     return spec

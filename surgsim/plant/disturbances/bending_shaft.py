@@ -122,8 +122,8 @@ class BendingShaft(Disturbance):
         """
         model, first = scene.model, int(scene.dof_ids[-1]) + 1
         at = slice(first, first + bend_joints(scene))
-        places = [int(model.joint(name).qposadr[0]) for name in BEND_JOINTS]
-        stiffness = np.array([np.ravel(model.joint(name).stiffness)[0] for name in BEND_JOINTS])
+        places = [int(scene.parts.joint(name).qposadr[0]) for name in BEND_JOINTS]
+        stiffness = np.array([np.ravel(scene.parts.joint(name).stiffness)[0] for name in BEND_JOINTS])
         posed = mujoco.MjData(model)
         posed.qpos[:] = data.qpos
         posed.qpos[places] = 0.0

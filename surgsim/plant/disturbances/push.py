@@ -99,7 +99,7 @@ class Push(Disturbance):
         gains, at = self.gains, self._c.at
         if at in ("elbow", "wrist"):
             links = link_names(scene.dof_ids.size)
-            gains[BODY] = int(scene.model.body(links[(len(links) - 1) // 2 if at == "elbow" else -2]).id)
+            gains[BODY] = int(scene.parts.body(links[(len(links) - 1) // 2 if at == "elbow" else -2]).id)
             return
         back = self._c.distance_m if at == "shaft" else 0.0
         gains[BODY], gains[SITE], gains[DISTANCE] = place_on_shaft(scene, back)

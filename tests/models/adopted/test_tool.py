@@ -9,6 +9,7 @@ from surgsim.metrics.catalog import compute_metrics
 from surgsim.models.arm import ArmModel
 from surgsim.models.build import build, build_arm
 from surgsim.models.config import InstrumentConfig, RobotConfig, SceneConfig
+from surgsim.resources import resource_dir
 from surgsim.scenario.load import load_scenario
 from surgsim.simulate.loop import simulate
 
@@ -160,3 +161,20 @@ def test_what_is_no_instrument_is_refused(tool, tmp_path):
 def test_the_nominal_arm_knows_the_tool(tool):
     scene = build_arm(_config(mjcf=str(tool), shaft_diameter_m=0.005, **SITES))
     assert {"adapter", "shaft"} < set(scene.shapes.names)
+
+
+@pytest.mark.parametrize("angle", [0, 30])
+def test_an_endoscopes_camera_goes_with_it_and_looks_off_its_shaft(angle):
+    file = resource_dir("assets") / "instruments" / f"endoscope_{angle}.xml"
+    scene = build(_config(mjcf=str(file), shaft_diameter_m=0.01), drawn=False)
+    data = mujoco.MjData(scene.model)
+    data.qpos[scene.qpos_ids] = Q
+    mujoco.mj_kinematics(scene.model, data)
+    mujoco.mj_camlight(scene.model, data)
+    lens = scene.model.camera("lens").id
+    tip, turn = data.site_xpos[scene.tip_site], data.site_xmat[scene.tip_site].reshape(3, 3)
+    looks = -data.cam_xmat[lens].reshape(3, 3)[:, 2]
+    assert np.linalg.norm(data.cam_xpos[lens] - tip) < 1e-3
+    assert np.rad2deg(np.arccos(np.clip(looks @ turn[:, 2], -1.0, 1.0))) == pytest.approx(angle, abs=1e-5)
+    if angle:
+        assert looks @ turn[:, 1] == pytest.approx(0.5, abs=1e-6)
