@@ -7,7 +7,7 @@ from surgsim.compare.failures import Failing, failing
 from surgsim.compare.leaderboard import LeaderboardRow
 from surgsim.compare.observations import Observations, metric_named
 from surgsim.compare.sentences import side
-from surgsim.compare.statistics import Comparison, compare_pair
+from surgsim.compare.statistics import Comparison, chance_of_failures, compare_pair
 from surgsim.compare.verdict import Verdict
 from surgsim.compare.wording import exactly, heading_of, listed, number, seeds_of, with_unit
 from surgsim.metrics.metric import Metric
@@ -102,10 +102,23 @@ def _by_how_much(found: Comparison, metric: Metric, matters: float, several: boo
         return f"of the next, {found.b}{also}, no run completed beside one of {found.a}."
     best = f"{found.a} with " if several else ""
     text = f"{best}{with_unit(found.mean_a, unit)} on average. Next comes {found.b}{also}"
-    if found.verdict in (Verdict.NO_DIFFERENCE, Verdict.NO_MATTER, Verdict.PERHAPS):  # failures decide
+    if found.verdict in (Verdict.NOT_TOLD_APART, Verdict.EQUIVALENT, Verdict.PERHAPS):  # failures decide
         return f"{text} with {with_unit(found.mean_b, unit)}. {found.sentence}"
     size = f"{with_unit(abs(value), unit)} {side(metric, -value)}{_ratio(found, metric, matters)}"
-    return f"{text} with {with_unit(found.mean_b, unit)}, {size}{_how_sure(found, unit)}."
+    return f"{text} with {with_unit(found.mean_b, unit)}, {size}{_how_sure(found, unit)}.{_failing_more(found)}"
+
+
+def _failing_more(found: Comparison) -> str:
+    """That the second fails more often, which puts it behind whatever its figures, and how likely by chance."""
+    if found.failed_a != found.failed_b:
+        told = f" {found.b} fails more often: {found.failed_b} of its paired runs against {found.failed_a}"
+        return f"{told} (by chance alone: p = {number(chance_of_failures(found), 2)})."
+    if found.not_done_a != found.not_done_b:
+        return (
+            f" {found.b} misses its task more often: in {found.not_done_b} paired runs against "
+            f"{found.not_done_a}."
+        )
+    return ""
 
 
 def _ratio(found: Comparison, metric: Metric, matters: float) -> str:

@@ -31,11 +31,11 @@ def one(value):
 @pytest.mark.parametrize(
     ("shift", "spread", "verdict", "sentence"),
     [
-        (-7e-4, 0.001, Verdict.NO_MATTER, "No difference that matters: −6.99e−4 [−7"),
+        (-7e-4, 0.001, Verdict.EQUIVALENT, "Equivalent: −6.99e−4 [−7"),
         (0.5, 1.0, Verdict.WORSE, "a is worse than b by 0.501 mm (+50 %) [0.4"),
         (-0.5, 1.0, Verdict.BETTER, "a is better than b by 0.499 mm (−50 %) [0.4"),
         (0.1, 1.0, Verdict.PERHAPS, "a is worse than b by 0.101 mm (+10 %) [0.08"),
-        (0.0, 20.0, Verdict.NO_DIFFERENCE, "No difference detected: 0.0167 [−"),
+        (0.0, 20.0, Verdict.NOT_TOLD_APART, "Not told apart, nor equivalent within ±0.1 mm: 0.0167 [−"),
     ],
 )
 def test_the_verdict_asks_whether_a_difference_matters(runs_of, shift, spread, verdict, sentence):
@@ -45,16 +45,16 @@ def test_the_verdict_asks_whether_a_difference_matters(runs_of, shift, spread, v
     assert found.sentence.startswith(sentence)
     if verdict is Verdict.PERHAPS:
         assert found.sentence.endswith("; whether by 0.1 mm, the least that matters, is open.")
-    if verdict is Verdict.NO_MATTER:
-        assert found.sentence.endswith(" mm, less than 0.1 mm.")
+    if verdict is Verdict.EQUIVALENT:
+        assert found.sentence.endswith(" mm, inside ±0.1 mm.")
 
 
 def test_a_mean_that_does_not_matter_names_the_scenarios_in_which_it_does(runs_of):
     up, down = line(1.3 + NOISE, "s"), line(0.7 + NOISE, "t")
     given = {"a": up | down, "b": line(np.ones(6), "s") | line(np.ones(6), "t")}
     found = compare_pair(runs_of(given, matters=0.1), "a", "b", TIP)
-    assert found.verdict is Verdict.NO_MATTER
-    assert found.sentence.endswith("less than 0.1 mm, but not in 2 of 2 scenarios.")
+    assert found.verdict is Verdict.EQUIVALENT
+    assert found.sentence.endswith("inside ±0.1 mm, but not in 2 of 2 scenarios.")
 
 
 def test_one_seed_says_what_was_seen_and_no_interval(runs_of):
@@ -129,8 +129,10 @@ def test_every_metric_says_what_matters_and_is_headed_by_words(metric):
     wanted = next((told for suffix, told in units.items() if metric.name.endswith(suffix)), None)
     assert wanted is None or unit == f"{wanted}]"
     assert metric.matters >= 0.0
-    assert metric.matters_source
-    assert (metric.matters == 0.0) == (metric.matters_source == "any difference counts")
+    source = metric.matters_source
+    assert source.text
+    assert (metric.matters == 0.0) == (source.kind == "none")
+    assert bool(source.reference) == (source.kind in ("clinical", "instrument"))
 
 
 def test_the_command_line_says_what_matters():
