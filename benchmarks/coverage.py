@@ -5,6 +5,7 @@
 random numbers, by its place in the table, so a part is the same as in the whole.
 
 """
+
 import json
 import sys
 from collections.abc import Callable, Sequence
@@ -37,7 +38,11 @@ PROPORTIONS = (0.8, 0.95, 0.99)
 DEGREES = 3
 """Degrees of freedom of the heavy-tailed law: it has a variance, but no third moment."""
 
-LAWS: dict[str, Any] = {"normal": stats.norm(), "lognormal": stats.lognorm(1.0), "heavy tails": stats.t(DEGREES)}
+LAWS: dict[str, Any] = {
+    "normal": stats.norm(),
+    "lognormal": stats.lognorm(1.0),
+    "heavy tails": stats.t(DEGREES),
+}
 
 
 def _mean(law: Any, n: int, rng: np.random.Generator) -> tuple[Interval, float]:

@@ -105,11 +105,13 @@ def _by_how_much(found: Comparison, metric: Metric, matters: float, several: boo
     if found.verdict in (Verdict.NOT_TOLD_APART, Verdict.EQUIVALENT, Verdict.PERHAPS):  # failures decide
         return f"{text} with {with_unit(found.mean_b, unit)}. {found.sentence}"
     size = f"{with_unit(abs(value), unit)} {side(metric, -value)}{_ratio(found, metric, matters)}"
-    return f"{text} with {with_unit(found.mean_b, unit)}, {size}{_how_sure(found, unit)}.{_failing_more(found)}"
+    return (
+        f"{text} with {with_unit(found.mean_b, unit)}, {size}{_how_sure(found, unit)}.{_failing_more(found)}"
+    )
 
 
 def _failing_more(found: Comparison) -> str:
-    """That the second fails more often, which puts it behind whatever its figures, and how likely by chance."""
+    """That the second fails more often, which puts it behind whatever its figures."""
     if found.failed_a != found.failed_b:
         told = f" {found.b} fails more often: {found.failed_b} of its paired runs against {found.failed_a}"
         return f"{told} (by chance alone: p = {number(chance_of_failures(found), 2)})."

@@ -12,7 +12,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from surgsim.metrics.metric import CHOICE, Metric, REPEATABILITY, STEADY_HAND, with_block
+from surgsim.metrics.metric import CHOICE, REPEATABILITY, STEADY_HAND, Metric, with_block
 from surgsim.trace.trace import Trace
 
 CONVERGED_TIP_M = 1e-3

@@ -34,7 +34,7 @@ REPEATABILITY = Source(
 )
 STEADY_HAND = Source(
     kind="clinical",
-    text="how still surgeons hold an instrument, 0.05 to 0.13 mm RMS, and how well the arms come back to a pose",
+    text="how still surgeons hold an instrument (0.05 to 0.13 mm RMS), and how well arms come back to a pose",
     reference="Riviere, Rader and Khosla 1997; ISO 9283, data sheets: 0.05 and 0.1 mm",
 )
 FORCE_RESOLUTION = Source(

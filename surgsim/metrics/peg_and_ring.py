@@ -9,7 +9,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from surgsim.metrics.metric import FORCE_RESOLUTION, Metric, PEG_TRANSFER_SECOND, with_block
+from surgsim.metrics.metric import FORCE_RESOLUTION, PEG_TRANSFER_SECOND, Metric, with_block
 from surgsim.trace.trace import Trace
 
 GRASPED, ON_TARGET = 1.0, 2.0

@@ -10,8 +10,9 @@ from surgsim.compare.aggregates import ranks, scores
 from surgsim.compare.leaderboard import leaderboard
 from surgsim.compare.matters import checked_matters, parse_matters
 from surgsim.compare.places import places_of
-from surgsim.compare.statistics import compare_pair
+from surgsim.compare.statistics import chance_of_failures, compare_pair
 from surgsim.compare.suite import SuiteConfig, with_changes
+from surgsim.compare.summary import summary
 from surgsim.compare.verdict import Verdict
 from surgsim.errors import SurgsimError
 from surgsim.metrics.catalog import METRICS
@@ -112,6 +113,30 @@ def test_who_is_not_told_apart_shares_a_place(runs_of):
     rows = leaderboard(runs_of(given, matters=0.1), TIP)
     assert [row.place for row in rows] == [1, 1, 3, 4]
     assert [row.place for row in leaderboard(runs_of(given), TIP, places=False)] == [None] * 4
+
+
+def test_who_fails_more_comes_after_whatever_its_figures(runs_of):
+    given = {
+        "accurate": line([0.1] * 18) | {("s", 18): "diverged", ("s", 19): "diverged"},
+        "steady": line(5.0 + 0.1 * np.arange(20)),
+        "once": line(np.full(19, 0.2)) | {("s", 19): "rcm_limit"},
+    }
+    runs = runs_of(given, matters=0.1)
+    assert places_of(runs, TIP) == {"steady": 1, "once": 2, "accurate": 3}
+    assert [row.controller for row in leaderboard(runs, TIP)] == ["steady", "once", "accurate"]
+    found = compare_pair(runs, "accurate", "steady", TIP)
+    assert found.verdict is Verdict.BETTER  # of the runs that it completed
+    assert chance_of_failures(found) == 0.5  # two pairs in which one alone failed: (1 + 1)/4
+    told = summary(runs, TIP, leaderboard(runs, TIP)).first
+    assert told.endswith(" once fails more often: 1 of its paired runs against 0 (by chance alone: p = 1.0).")
+
+
+def test_who_misses_the_task_more_often_comes_after(runs_of):
+    runs = runs_of({"near": line(np.full(6, 0.1)), "far": line(5.0 + NOISE)}, matters=0.1)
+    runs = replace(runs, success=np.array([1.0] * 5 + [0.0] + [1.0] * 6))
+    assert places_of(runs, TIP) == {"far": 1, "near": 2}
+    told = summary(runs, TIP, leaderboard(runs, TIP)).first
+    assert told.endswith(" near misses its task more often: in 1 paired runs against 0.")
 
 
 def test_one_seed_gives_places_by_what_was_seen(runs_of):
