@@ -103,7 +103,8 @@ def _by_how_much(found: Comparison, metric: Metric, matters: float, several: boo
     best = f"{found.a} with " if several else ""
     text = f"{best}{with_unit(found.mean_a, unit)} on average. Next comes {found.b}{also}"
     if found.verdict in (Verdict.NOT_TOLD_APART, Verdict.EQUIVALENT, Verdict.PERHAPS):  # failures decide
-        return f"{text} with {with_unit(found.mean_b, unit)}. {found.sentence}"
+        decided = f" Failures decide{_by_chance(found)}." if found.failed_a != found.failed_b else ""
+        return f"{text} with {with_unit(found.mean_b, unit)}. {found.sentence}{decided}"
     size = f"{with_unit(abs(value), unit)} {side(metric, -value)}{_ratio(found, metric, matters)}"
     return (
         f"{text} with {with_unit(found.mean_b, unit)}, {size}{_how_sure(found, unit)}.{_failing_more(found)}"
@@ -113,14 +114,19 @@ def _by_how_much(found: Comparison, metric: Metric, matters: float, several: boo
 def _failing_more(found: Comparison) -> str:
     """That the second fails more often, which puts it behind whatever its figures."""
     if found.failed_a != found.failed_b:
-        told = f" {found.b} fails more often: {found.failed_b} of its paired runs against {found.failed_a}"
-        return f"{told} (by chance alone: p = {number(chance_of_failures(found), 2)})."
+        counts = f"{found.failed_b} of its paired runs against {found.failed_a}"
+        return f" {found.b} fails more often: {counts}{_by_chance(found)}."
     if found.not_done_a != found.not_done_b:
-        return (
-            f" {found.b} misses its task more often: in {found.not_done_b} paired runs against "
-            f"{found.not_done_a}."
-        )
+        counts = f"in {found.not_done_b} paired runs against {found.not_done_a}"
+        return f" {found.b} misses its task more often: {counts}."
     return ""
+
+
+def _by_chance(found: Comparison) -> str:
+    """How likely the failures are so unequal by chance; empty where they are equal."""
+    if found.failed_a == found.failed_b:
+        return ""
+    return f" (p = {number(chance_of_failures(found), 2)} by chance alone)"
 
 
 def _ratio(found: Comparison, metric: Metric, matters: float) -> str:

@@ -128,7 +128,7 @@ def test_who_fails_more_comes_after_whatever_its_figures(runs_of):
     assert found.verdict is Verdict.BETTER  # of the runs that it completed
     assert chance_of_failures(found) == 0.5  # two pairs in which one alone failed: (1 + 1)/4
     told = summary(runs, TIP, leaderboard(runs, TIP)).first
-    assert told.endswith(" once fails more often: 1 of its paired runs against 0 (by chance alone: p = 1.0).")
+    assert told.endswith(" once fails more often: 1 of its paired runs against 0 (p = 1.0 by chance alone).")
 
 
 def test_who_misses_the_task_more_often_comes_after(runs_of):
