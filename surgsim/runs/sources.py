@@ -9,7 +9,7 @@ import surgsim
 from surgsim.resources import resource_dir
 
 ROOT = Path(surgsim.__file__).resolve().parent
-LATER_ROOMS = ("api", "cli", "report", "studies", "tuning")
+LATER_ROOMS = ("api", "cli", "protocol", "report", "studies", "tuning")
 """Folders of surgsim that only see finished runs: they cannot change one."""
 
 
