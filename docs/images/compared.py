@@ -8,7 +8,7 @@ from surgsim.compare.wording import exactly, heading_of
 from surgsim.metrics.catalog import METRICS
 from surgsim.metrics.metric import Source
 
-COVERAGE = Path(__file__).resolve().parents[2] / "benchmarks" / "coverage.json"
+COVERAGE = Path(__file__).resolve().parents[2] / "benchmarks" / "interval_coverage.json"
 _KINDS = ("clinical", "instrument", "choice", "none")
 
 Table = tuple[list[str], list[list[str]]]

@@ -3,11 +3,11 @@
 Runs are resampled within each scenario (strata): the scenarios of a suite are chosen, its seeds are drawn.
 The random numbers are seeded from the data themselves, so the same data always give the same interval.
 
-How often they cover the truth is measured: `benchmarks/coverage.py`, with its table in `docs/statistics.md`.
+How often they cover the truth is measured by `benchmarks/interval_coverage.py`; the table is in
+`docs/statistics.md`.
 
 Sources: Efron and Tibshirani, An Introduction to the Bootstrap, 1993, section 12.5 (bootstrap-t); Hesterberg,
-The American Statistician 69, 2015 (expanded percentile interval); Wilson, JASA 22, 1927; David and Nagaraja,
-Order Statistics, 2003, section 7.1 (quantiles).
+The American Statistician 69, 2015 (expanded percentile interval); Wilson, JASA 22, 1927.
 """
 
 import hashlib
@@ -159,43 +159,3 @@ def proportion_interval(share: float, sizes: Sequence[int]) -> Interval:
     centre = (share + z * z / (2 * n)) / (1 + z * z / n)
     half = z * np.sqrt(share * (1 - share) / n + z * z / (4 * n * n)) / (1 + z * z / n)
     return Interval(value=share, low=max(0.0, float(centre - half)), high=min(1.0, float(centre + half)), n=n)
-
-
-def quantile_interval(values: Array, share: float) -> Interval:
-    """A quantile of independent `values` (n,), with the interval between two of them.
-
-    How many values lie below the true quantile is binomial (n, share), whatever they are drawn from. So the
-    interval from the i-th to the j-th smallest covers it with at least 95 % where P(B < i) and P(B >= j) are
-    at most 2.5 %. Above the largest value the sample knows nothing: with few values the 95 % quantile has a
-    lower end alone, and the note says how many it takes. A bootstrap would give an upper end all the same,
-    which is exceeded far more often than it says.
-
-    Args:
-        values: One of each independent run.
-        share: Which quantile, between 0 and 1, for instance 0.95.
-    """
-    n = int(values.size)
-    value = float(np.quantile(values, share)) if n else None
-    note = too_few([n]) or (SEEDS_DO_NOT_MATTER if same(values, 0.0) else "")
-    if note:
-        return Interval(value=value, n=n, note=note)
-    ordered, tail = np.sort(values), (1 - LEVEL) / 2
-    below = stats.binom.cdf(np.arange(n), n, share)  # P(B <= k)
-    lows, highs = np.flatnonzero(below <= tail), np.flatnonzero(below >= 1 - tail)
-    low = float(ordered[lows[-1]]) if lows.size else None  # the i-th, P(B <= i - 1) small
-    high = float(ordered[highs[0]]) if highs.size else None  # the j-th, P(B <= j - 1) large
-    return Interval(value=value, low=low, high=high, n=n, note=_open(n, share, low, high))
-
-
-def _open(n: int, share: float, low: float | None, high: float | None) -> str:
-    """Why an interval of a quantile is open at an end; empty if it is not."""
-    ends = [(high, "upper", share), (low, "lower", 1 - share)]
-    for end, name, part in ends:
-        if end is None:
-            return f"no {name} end: that takes {seeds_for(part)} runs, not {n}"
-    return ""
-
-
-def seeds_for(share: float) -> int:
-    """Independent values that an upper end of their `share` quantile takes: share^n <= 2.5 %."""
-    return int(np.ceil(np.log((1 - LEVEL) / 2) / np.log(share)))

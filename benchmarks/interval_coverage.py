@@ -1,6 +1,6 @@
-"""Measures how often the 95 % intervals of `surgsim.compare.intervals` cover the truth, by simulation.
+"""Measures how often the 95 % intervals of pages and scorecards cover the truth, by simulation.
 
-`python benchmarks/coverage.py` writes `benchmarks/coverage.json` (about three minutes on one core);
+`python benchmarks/interval_coverage.py` writes `interval_coverage.json` beside it, in three minutes;
 `docs/statistics.md` shows it as a table, and a test makes a part of it again. Every trial has its own
 random numbers, by its place in the table, so a part is the same as in the whole.
 
@@ -23,14 +23,14 @@ from surgsim.compare.intervals import (
     mean_interval,
     percentile,
     proportion_interval,
-    quantile_interval,
     resampled,
 )
+from surgsim.protocol.figures import quantile_interval
 
 Array = NDArray[np.float64]
 Drawn = Callable[[np.random.Generator, int], Array]
 
-KEPT = Path(__file__).with_name("coverage.json")
+KEPT = Path(__file__).with_name("interval_coverage.json")
 TRIALS = 1000
 SIZES = (5, 10, 20, 80)
 SHARE = 0.95
