@@ -27,6 +27,8 @@ COMMANDS = (
     "tune",
     "score",
     "seeds",
+    "submit",
+    "verify",
     "protocol",
     "report",
     "inspect",
@@ -49,6 +51,7 @@ _EPILOG = """examples:
   surgsim tune vprnn --scenario circle_panda --budget 300
                                        better gains for a controller
   surgsim score rcm_inverse_dynamics   a controller through the frozen protocol
+  surgsim verify mine.zip              somebody's score, checked and run again
   surgsim inspect runs/circle_lwr4plus/vprnn-seed0 --view
 """
 

@@ -213,6 +213,11 @@ class Protocol:
         return tuple(arm for arm in self.config.arms if arm in asked)
 
 
+def protocol_names() -> list[str]:
+    """Names of the shipped protocols."""
+    return sorted(shipped(FOLDER))
+
+
 def load_protocol(name: str = CURRENT) -> Protocol:
     """A protocol by the name of a shipped one, or by its file.
 

@@ -14,6 +14,7 @@ from surgsim.control.policies.registry import policy_names
 from surgsim.errors import ScenarioError, SurgsimError, unknown_name
 from surgsim.protocol.canonical import sha256_of
 from surgsim.protocol.definition import Protocol, TrackConfig
+from surgsim.runs.parts import external_names
 from surgsim.scenario.load import find, load_controller, shipped
 
 ANY = "*"
@@ -66,21 +67,18 @@ def entrant(source: str | None, *, tuning_runs: int | None = None, label: str = 
     Raises:
         SurgsimError: If there is no such controller, or anything is wrong with it.
     """
-    commands = dict(given())
-    weights = _program_hashes(commands)
     if source is None:
-        return Entrant(
-            config=_external(commands), tuning=_declared(tuning_runs), weights=weights, label=label
+        config, tuning = _external(dict(given())), _declared(tuning_runs)
+    elif source in policy_names() and source not in shipped("controllers"):
+        config, tuning = _policy(source), _declared(tuning_runs)
+    else:
+        config = load_controller(source)
+        tuning = (
+            _declared(tuning_runs)
+            if tuning_runs is not None
+            else _told(find(source, "controllers", "controller"))
         )
-    if source in policy_names() and source not in shipped("controllers"):
-        return Entrant(config=_policy(source), tuning=_declared(tuning_runs), weights=weights, label=label)
-    config = load_controller(source)
-    told = (
-        _declared(tuning_runs)
-        if tuning_runs is not None
-        else _told(find(source, "controllers", "controller"))
-    )
-    return Entrant(config=config, tuning=told, weights=weights, label=label)
+    return Entrant(config=config, tuning=tuning, weights=program_hashes(config), label=label)
 
 
 def track_for(protocol: Protocol, entrant: Entrant, name: str | None) -> str:
@@ -166,11 +164,11 @@ def _policy(name: str) -> ControllerConfig:
     )
 
 
-def _program_hashes(commands: Mapping[str, str]) -> dict[str, str]:
-    """Hashes of the files that the commands of external controllers name."""
-    found = {}
-    for command in commands.values():
-        for word in shlex.split(command):
+def program_hashes(config: ControllerConfig) -> dict[str, str]:
+    """Hashes of the files that the commands of the controller's external parts name."""
+    found, commands = {}, dict(given())
+    for name in external_names(config):
+        for word in shlex.split(commands.get(name, "")):
             path = Path(word.partition(":")[0])
             if path.is_file():
                 found[path.name] = hashlib.sha256(path.read_bytes()).hexdigest()

@@ -6,6 +6,9 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+from llvmlite import binding
+from numba import config
+
 from surgsim.compare.job import BROKEN, Job
 from surgsim.compare.workers import Done
 from surgsim.errors import SurgsimError
@@ -32,10 +35,22 @@ def run_key(scenario: Scenario) -> str:
     Packages that gave the scenario a part, files of policies and what external controllers declare count too.
     """
     told = provenance_of(scenario)
-    compilers = {name: version(name) for name in _COMPILERS}
-    return sha256_of(
-        {"scenario": told["scenario_sha256"], "code": told["code_sha256"], "compilers": compilers}
-    )
+    return key_of(told["scenario_sha256"], told["code_sha256"], compilers())
+
+
+def key_of(scenario_sha256: str, code_sha256: str, compilers: Mapping[str, str]) -> str:
+    """The key of a run, of what it follows from."""
+    return sha256_of({"scenario": scenario_sha256, "code": code_sha256, "compilers": dict(compilers)})
+
+
+def compilers() -> dict[str, str]:
+    """Versions of what compiles the kernels."""
+    return {name: version(name) for name in _COMPILERS}
+
+
+def cpu() -> str:
+    """Name of the processor that kernels are compiled for."""
+    return str(config.CPU_NAME or binding.get_host_cpu_name())
 
 
 @dataclass(frozen=True, kw_only=True)
