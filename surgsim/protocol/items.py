@@ -35,7 +35,9 @@ def all_items(protocol: Protocol) -> Items:
     """
     config = protocol.config
     found = items_of(protocol, list(config.generators), list(config.arms))
-    for track in config.tracks.values():
+    for title, track in config.tracks.items():
+        for scheme in track.schemes:
+            found[f"scheme/{title}/{scheme}"] = _scheme(protocol, title, scheme)
         for name in track.entries:
             found.setdefault(
                 f"entry/{name}", sha256_of(load_controller(entry_file(name)).model_dump(mode="json"))
@@ -72,6 +74,19 @@ def _scenarios(protocol: Protocol, generator: str, arm: str) -> str:
                 hashes.setdefault(f"{cell.axis}={cell.level}", cell.scenario.sha256())
     except ScenarioError as error:
         raise SurgsimError(f"{protocol.path}: generator {generator}, arm {arm}: {error}") from error
+    return sha256_of(hashes)
+
+
+def _scheme(protocol: Protocol, track: str, scheme: str) -> str:
+    """Hash of complete scenarios of a track's scheme."""
+    seeds, settings = Seeds(kind="probe", key=PROBE), protocol.settings_of(track, scheme)
+    hashes = [
+        cell.scenario.sha256()
+        for generator in protocol.track(track).generators
+        for arm in protocol.config.arms
+        for cell in cells_of(protocol, generator, arm, seeds, reference(), settings)
+        if cell.scenario is not None
+    ]
     return sha256_of(hashes)
 
 
