@@ -95,15 +95,25 @@ def cells_of(
     seeds: Seeds,
     controller: ControllerConfig,
     settings: tuple[str, ...] = (),
+    most_seeds: int | None = None,
 ) -> Iterator[Cell]:
     """Every run of one generator with one arm, with these `key.path=value` settings in all of them.
+
+    Args:
+        protocol: The protocol.
+        generator: Name of the generator.
+        arm: The robot.
+        seeds: Where seeds come from.
+        controller: The controller.
+        settings: `key.path=value` settings of all runs.
+        most_seeds: Only so many seeds at each point; None: as many as the generator says.
 
     Raises:
         ScenarioError: If the protocol itself makes a scenario that is not valid.
     """
     config = protocol.config.generators[generator]
     for point in _points(config, seeds, generator):
-        for seed in point.seeds:
+        for seed in point.seeds[:most_seeds]:
             tree = scenario_tree(protocol, generator, arm, seed)
             scenario, refusal = _load(tree, (*settings, *point.assignments), seed, controller)
             yield Cell(

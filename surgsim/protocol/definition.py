@@ -224,7 +224,7 @@ class Protocol:
         asked = list(self.config.arms) if names is None else names.split(",")
         for arm in asked:
             if arm not in self.config.arms:
-                raise SurgsimError(f"--arms: {unknown_name(arm, 'arm of the protocol', self.config.arms)}")
+                raise SurgsimError(f"--arms: {unknown_name(arm, 'robot of the protocol', self.config.arms)}")
         return tuple(arm for arm in self.config.arms if arm in asked)
 
 

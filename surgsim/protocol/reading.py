@@ -39,9 +39,12 @@ def scores_below(folder: Path) -> list[Score]:
     """Every score in `folder` and its subfolders, by path.
 
     Raises:
-        SurgsimError: If one is damaged.
+        SurgsimError: If there is none, or one is damaged.
     """
-    return [read_score(path.parent) for path in sorted(folder.rglob(SCORE))]
+    found = [read_score(path.parent) for path in sorted(folder.rglob(SCORE))]
+    if not found:
+        raise SurgsimError(f"{folder} holds no score")
+    return found
 
 
 def baselines_of(score: Score, others: Iterable[Score], protocol: Protocol) -> list[Score]:
