@@ -36,6 +36,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--track", metavar="T", help="track; default: the first that the controller may enter"
     )
+    parser.add_argument("--scheme", default="", metavar="S", help="scheme, in a track that has some")
     parser.add_argument("--arms", metavar="A,B", help="arms; default: all of the protocol")
     parser.add_argument(
         "--seeds", default="development", metavar="ROUND", help="development, or an open round"
@@ -87,7 +88,7 @@ def _one(options: argparse.Namespace) -> int:
     from surgsim.cli.score_table import print_score
     from surgsim.cli.table import print_prose
     from surgsim.protocol.passport_files import write_passport
-    from surgsim.protocol.reading import comparable, scores_below
+    from surgsim.protocol.reading import baselines_of, scores_below
     from surgsim.protocol.score import check_out, score, write_score
 
     wish = _wish(options)
@@ -100,7 +101,7 @@ def _one(options: argparse.Namespace) -> int:
         print_prose(f"{_store(options)}: other shards' runs are missing; the same command goes on")
         return 1
     write_score(out, found)
-    write_passport(out, found, comparable(found, others), wish.protocol.config)
+    write_passport(out, found, baselines_of(found, others, wish.protocol), wish.protocol.config)
     if options.json:
         print(json.dumps(found.content, indent=2))
     else:
@@ -152,10 +153,12 @@ def _wish(options: argparse.Namespace) -> "Wish":
         raise SurgsimError("give a controller, --external NAME=COMMAND, or --all")
     if options.controller is not None:
         check_known(options.controller)
-    who = entrant(options.controller, tuning_runs=options.tuning_runs)
+    who = entrant(options.controller, tuning_runs=options.tuning_runs, scheme=options.scheme)
+    track = track_for(protocol, who, options.track)
+    protocol.settings_of(track, options.scheme)
     return Wish(
         protocol=protocol,
-        track=track_for(protocol, who, options.track),
+        track=track,
         arms=protocol.arms_of(options.arms),
         seeds=seeds_of(protocol, options.seeds),
         entrant=who,

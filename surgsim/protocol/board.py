@@ -7,10 +7,10 @@ from pathlib import Path
 
 from surgsim.compare.workers import kept_workers, run_jobs
 from surgsim.protocol.board_page import write_board
-from surgsim.protocol.definition import Protocol, entry_file
+from surgsim.protocol.definition import Protocol, entry_file, entry_label, entry_scheme
 from surgsim.protocol.entrants import entrant
 from surgsim.protocol.passport_files import write_passport
-from surgsim.protocol.reading import comparable
+from surgsim.protocol.reading import baselines_of
 from surgsim.protocol.runs import Report
 from surgsim.protocol.score import Means, Score, Wish, check_out, score, write_score
 from surgsim.protocol.seeds import Seeds
@@ -38,13 +38,7 @@ class Board:
 
     def folder(self, track: str, entry: str) -> Path:
         """The folder of an entry's score."""
-        return self.out / track / self.label(entry)
-
-    @staticmethod
-    def label(entry: str) -> str:
-        """What tables call an entry: the tuned gains of a shipped controller are told apart by their name."""
-        path = Path(entry)
-        return f"{path.stem}_tuned" if path.suffix else entry
+        return self.out / track / entry_label(entry)
 
 
 def make_board(
@@ -70,7 +64,7 @@ def make_board(
             track=track,
             arms=board.arms,
             seeds=board.seeds,
-            entrant=entrant(entry_file(entry), label=board.label(entry)),
+            entrant=entrant(entry_file(entry), label=entry_label(entry), scheme=entry_scheme(entry)),
         )
         for track in board.tracks
         for entry in board.protocol.track(track).entries
@@ -99,8 +93,5 @@ def make_board(
 def _write_passports(board: Board, found: dict[Path, Score]) -> None:
     """Each passport beside the baselines of its track."""
     for folder, made in found.items():
-        track = str(made.content["track"])
-        baselines = [
-            found[board.folder(track, entry)] for entry in board.protocol.config.tracks[track].baselines
-        ]
-        write_passport(folder, made, comparable(made, baselines), board.protocol.config)
+        beside = baselines_of(made, found.values(), board.protocol)
+        write_passport(folder, made, beside, board.protocol.config)

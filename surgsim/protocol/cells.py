@@ -57,20 +57,26 @@ class _Point:
 
 
 def cells(
-    protocol: Protocol, track: str, arms: Sequence[str], seeds: Seeds, controller: ControllerConfig
+    protocol: Protocol,
+    track: str,
+    arms: Sequence[str],
+    seeds: Seeds,
+    controller: ControllerConfig,
+    scheme: str = "",
 ) -> tuple[Cell, ...]:
     """Every run of a track for these arms, sorted by id.
 
     Raises:
+        SurgsimError: If the track has no such scheme.
         ScenarioError: If the protocol itself makes a scenario that is not valid.
     """
     chosen = protocol.track(track)
-    served = serving(chosen, controller)
+    served, settings = serving(chosen, controller), protocol.settings_of(track, scheme)
     found = [
         cell
         for name in chosen.generators
         for arm in arms
-        for cell in cells_of(protocol, name, arm, seeds, served)
+        for cell in cells_of(protocol, name, arm, seeds, served, settings)
     ]
     return tuple(sorted(found, key=lambda cell: cell.id))
 
@@ -83,18 +89,33 @@ def serving(track: TrackConfig, controller: ControllerConfig) -> ControllerConfi
 
 
 def cells_of(
-    protocol: Protocol, generator: str, arm: str, seeds: Seeds, controller: ControllerConfig
+    protocol: Protocol,
+    generator: str,
+    arm: str,
+    seeds: Seeds,
+    controller: ControllerConfig,
+    settings: tuple[str, ...] = (),
+    most_seeds: int | None = None,
 ) -> Iterator[Cell]:
-    """Every run of one generator with one arm.
+    """Every run of one generator with one arm, with these `key.path=value` settings in all of them.
+
+    Args:
+        protocol: The protocol.
+        generator: Name of the generator.
+        arm: The robot.
+        seeds: Where seeds come from.
+        controller: The controller.
+        settings: `key.path=value` settings of all runs.
+        most_seeds: Only so many seeds at each point; None: as many as the generator says.
 
     Raises:
         ScenarioError: If the protocol itself makes a scenario that is not valid.
     """
     config = protocol.config.generators[generator]
     for point in _points(config, seeds, generator):
-        for seed in point.seeds:
+        for seed in point.seeds[:most_seeds]:
             tree = scenario_tree(protocol, generator, arm, seed)
-            scenario, refusal = _load(tree, point, seed, controller)
+            scenario, refusal = _load(tree, (*settings, *point.assignments), seed, controller)
             yield Cell(
                 generator=generator,
                 arm=arm,
@@ -130,13 +151,13 @@ def reference() -> ControllerConfig:
 
 
 def _load(
-    tree: Mapping[str, Any], point: _Point, seed: int, controller: ControllerConfig
+    tree: Mapping[str, Any], assignments: Sequence[str], seed: int, controller: ControllerConfig
 ) -> tuple[Scenario | None, str]:
     """The scenario; None, and why, where this controller does not fit it and the reference does."""
     try:
-        return load_scenario(tree, controller=controller, assignments=point.assignments, seed=seed), ""
+        return load_scenario(tree, controller=controller, assignments=assignments, seed=seed), ""
     except ScenarioError as error:
-        load_scenario(tree, controller=reference(), assignments=point.assignments, seed=seed)
+        load_scenario(tree, controller=reference(), assignments=assignments, seed=seed)
         return None, str(error)
 
 

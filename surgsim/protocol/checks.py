@@ -109,12 +109,15 @@ def asked_of(bundle: Bundle, protocol: Protocol) -> Asked | Finding:
     """What the protocol asks of the controller; a finding if that is none that may enter here."""
     score = bundle.score
     try:
-        config = load_controller(score.controller.definition)
+        definition = dict(score.controller.definition)
+        scheme = str(definition.pop("scheme", ""))
+        config = load_controller(definition)
         entrant = Entrant(
             config=config,
             tuning=score.tuning,
             weights=score.controller.weights,
             label=score.controller.name,
+            scheme=scheme,
         )
         if entrant.definition_sha256 != score.controller.definition_sha256:
             return _hashed(
@@ -125,7 +128,7 @@ def asked_of(bundle: Bundle, protocol: Protocol) -> Asked | Finding:
             )
         check_entry(score.track, protocol.track(score.track), config)
         seeds = seeds_of(protocol, score.seeds.round or score.seeds.kind)
-        found = cells(protocol, score.track, score.arms, seeds, config)
+        found = cells(protocol, score.track, score.arms, seeds, config, scheme)
     except SurgsimError as error:
         told = " ".join(str(error).split())
         return Finding(where="controller", what=score.controller.name[:60], bundle="scored", here=told)

@@ -70,8 +70,9 @@ class TrackConfig(PartConfig):
         ports: Port estimators that may be used.
         instruments: Instrument estimators that may be used.
         servo: Keys of the controller that take the place of the entrant's own: what follows its velocities.
-        needs_torque_law: Whether a controller without a torque law is refused.
-        entries: Shipped controllers of the leaderboard: names, or paths from the folder of shipped scenarios.
+        schemes: Variants of the operator's side that may be entered, each with its settings of the scenario.
+        entries: Shipped controllers of the leaderboard: names, or paths from the folder of shipped scenarios;
+            with a scheme, `name+scheme`.
         baselines: Those of them that a passport is drawn beside.
     """
 
@@ -80,7 +81,7 @@ class TrackConfig(PartConfig):
     ports: Some
     instruments: Some
     servo: Part | None = None
-    needs_torque_law: bool = True
+    schemes: dict[Name, tuple[str, ...]] = Field(default_factory=dict)
     entries: Some
     baselines: tuple[str, ...] = ()
 
@@ -200,6 +201,20 @@ class Protocol:
             raise SurgsimError(f"--track: {unknown_name(name, 'track', self.config.tracks)}")
         return self.config.tracks[name]
 
+    def settings_of(self, track: str, scheme: str) -> tuple[str, ...]:
+        """Settings of a track's scheme; none for the empty name, which is that of a track without schemes.
+
+        Raises:
+            SurgsimError: If the track has no such scheme.
+        """
+        schemes = self.track(track).schemes
+        if not scheme and not schemes:
+            return ()
+        if scheme not in schemes:
+            known = unknown_name(scheme, "scheme", schemes)
+            raise SurgsimError(f"--scheme: track '{track}': {known}" if schemes else f"--scheme: {known}")
+        return schemes[scheme]
+
     def arms_of(self, names: str | None) -> tuple[str, ...]:
         """Arms from `a,b`, in the protocol's order; all for None.
 
@@ -209,7 +224,7 @@ class Protocol:
         asked = list(self.config.arms) if names is None else names.split(",")
         for arm in asked:
             if arm not in self.config.arms:
-                raise SurgsimError(f"--arms: {unknown_name(arm, 'arm of the protocol', self.config.arms)}")
+                raise SurgsimError(f"--arms: {unknown_name(arm, 'robot of the protocol', self.config.arms)}")
         return tuple(arm for arm in self.config.arms if arm in asked)
 
 
@@ -238,9 +253,27 @@ def load_protocol(name: str = CURRENT) -> Protocol:
     return Protocol(config=config, path=path)
 
 
-def entry_file(name: str) -> str:
+def entry_file(entry: str) -> str:
     """What loads an entry of a track: its name, or the path of one in the folder of shipped scenarios."""
+    name = entry.partition("+")[0]
     return str(resource_dir("scenarios") / name) if name.endswith(".yaml") else name
+
+
+def entry_scheme(entry: str) -> str:
+    """The scheme of an entry; empty without one."""
+    return entry.partition("+")[2]
+
+
+def entry_label(name: str) -> str:
+    """What tables call an entry: tuned gains of a shipped controller are told apart from its own.
+
+    Example:
+        >>> entry_label("tuned/rcm_mpc.yaml"), entry_label("rcm_mpc")
+        ('rcm_mpc_tuned', 'rcm_mpc')
+    """
+    path, scheme = Path(name.partition("+")[0]), entry_scheme(name)
+    label = f"{path.stem}_tuned" if path.parent.name == "tuned" else path.stem
+    return f"{label}_{scheme}" if scheme else label
 
 
 def merged(below: Mapping[str, Any], above: Mapping[str, Any]) -> dict[str, Any]:

@@ -33,12 +33,14 @@ class Entrant:
         tuning: What its gains cost: `runs`, `seeds`, `scenarios`, `source`; None where unknown.
         weights: Files beside the packages that it consists of, with their SHA-256.
         label: What tables call it, if not by its own name.
+        scheme: The track's scheme with which it runs; empty in a track without schemes.
     """
 
     config: ControllerConfig
     tuning: Mapping[str, Any]
     weights: Mapping[str, str] = field(default_factory=dict)
     label: str = ""
+    scheme: str = ""
 
     @property
     def name(self) -> str:
@@ -47,8 +49,9 @@ class Entrant:
 
     @property
     def definition(self) -> dict[str, Any]:
-        """All of the controller, every default explicit."""
-        return dict(self.config.model_dump(mode="json"))
+        """All of the controller, every default explicit, and its scheme if it has one."""
+        content = dict(self.config.model_dump(mode="json"))
+        return {**content, "scheme": self.scheme} if self.scheme else content
 
     @property
     def definition_sha256(self) -> str:
@@ -56,13 +59,16 @@ class Entrant:
         return sha256_of(self.definition)
 
 
-def entrant(source: str | None, *, tuning_runs: int | None = None, label: str = "") -> Entrant:
+def entrant(
+    source: str | None, *, tuning_runs: int | None = None, label: str = "", scheme: str = ""
+) -> Entrant:
     """The controller by the name of a shipped one, by its file, or the name of an installed policy.
 
     Args:
         source: The name or path; None: the one external controller whose command is given, for torques.
         tuning_runs: Runs that its gains took, as its owner declares; None: what its file says.
         label: What tables call it, if not by its own name.
+        scheme: The track's scheme with which it runs.
 
     Raises:
         SurgsimError: If there is no such controller, or anything is wrong with it.
@@ -78,7 +84,7 @@ def entrant(source: str | None, *, tuning_runs: int | None = None, label: str = 
             if tuning_runs is not None
             else _told(find(source, "controllers", "controller"))
         )
-    return Entrant(config=config, tuning=tuning, weights=program_hashes(config), label=label)
+    return Entrant(config=config, tuning=tuning, weights=program_hashes(config), label=label, scheme=scheme)
 
 
 def track_for(protocol: Protocol, entrant: Entrant, name: str | None) -> str:
@@ -114,7 +120,7 @@ def refusal(track: TrackConfig, config: ControllerConfig) -> str:
         kind = str(getattr(config, key).type)
         if ANY not in allowed and kind not in allowed:
             return f"it reads {key}: {kind}, and the track gives {', '.join(allowed)}"
-    if track.needs_torque_law and track.servo is None and config.torque_law is None:
+    if track.servo is None and config.torque_law is None:
         return "it commands no torques: its torque_law is null"
     return ""
 

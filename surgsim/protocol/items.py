@@ -15,7 +15,7 @@ from surgsim.runs.sources import ROOT, hash_of
 from surgsim.scenario.load import load_controller
 
 PROBE = "0" * 64
-"""Key of the seeds with which scenarios are made that stand for all of a generator."""
+"""Key of the seed with which scenarios are made that stand for all of a generator."""
 _CODE = (
     "metrics",
     "verdict.py",
@@ -35,7 +35,9 @@ def all_items(protocol: Protocol) -> Items:
     """
     config = protocol.config
     found = items_of(protocol, list(config.generators), list(config.arms))
-    for track in config.tracks.values():
+    for title, track in config.tracks.items():
+        for scheme in track.schemes:
+            found[f"scheme/{title}/{scheme}"] = _scheme(protocol, title, scheme)
         for name in track.entries:
             found.setdefault(
                 f"entry/{name}", sha256_of(load_controller(entry_file(name)).model_dump(mode="json"))
@@ -63,15 +65,28 @@ def protocol_sha256(items: Items) -> str:
 
 
 def _scenarios(protocol: Protocol, generator: str, arm: str) -> str:
-    """Hash of complete scenarios, every default in them, at every level: for seeds that stand for all."""
+    """Hash of complete scenarios, every default in them, at every level: for a seed that stands for all."""
     seeds = Seeds(kind="probe", key=PROBE)
     hashes: dict[str, Any] = {}
     try:
-        for cell in cells_of(protocol, generator, arm, seeds, reference()):
+        for cell in cells_of(protocol, generator, arm, seeds, reference(), most_seeds=1):
             if cell.scenario is not None:
-                hashes.setdefault(f"{cell.axis}={cell.level}", cell.scenario.sha256())
+                hashes[f"{cell.axis}={cell.level}"] = cell.scenario.sha256()
     except ScenarioError as error:
         raise SurgsimError(f"{protocol.path}: generator {generator}, arm {arm}: {error}") from error
+    return sha256_of(hashes)
+
+
+def _scheme(protocol: Protocol, track: str, scheme: str) -> str:
+    """Hash of complete scenarios of a track's scheme."""
+    seeds, settings = Seeds(kind="probe", key=PROBE), protocol.settings_of(track, scheme)
+    hashes = [
+        cell.scenario.sha256()
+        for generator in protocol.track(track).generators
+        for arm in protocol.config.arms
+        for cell in cells_of(protocol, generator, arm, seeds, reference(), settings, most_seeds=1)
+        if cell.scenario is not None
+    ]
     return sha256_of(hashes)
 
 

@@ -1,10 +1,13 @@
 """The robustness passport as a chart: how far a controller gets along every axis, beside others."""
 
 from collections.abc import Mapping, Sequence
+from textwrap import wrap
 from typing import TYPE_CHECKING, Any
 
 from surgsim.export.paper_style import colours, new_figure
+from surgsim.protocol.definition import ProtocolConfig
 from surgsim.protocol.score import Score
+from surgsim.protocol.wording import figure_told, sentence, timing_told, tuning_told
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -12,32 +15,72 @@ if TYPE_CHECKING:
 
 MARKS = ("o", "s", "^", "D", "v", "P", "X")
 """Shapes tell controllers apart where colours do not print."""
-_ROW_IN = 0.42
-_HEAD_IN = 1.1
+_ROW_IN, _HEAD_IN, _LINE_IN = 0.4, 1.0, 0.17
 _SPREAD = 0.24
 
 
-def passport_figure(score: Score, others: Sequence[Score]) -> "Figure":
+def passport_figure(score: Score, others: Sequence[Score], protocol: ProtocolConfig) -> "Figure":
     """A row for each axis: its levels from easy to hard, and where each controller fails first.
 
-    A mark stands at the first level that fails; one that holds all of them stands at the right end.
+    A mark stands at the first level that fails; one that holds all of them stands at the right end. Above it
+    stands who it is and what failed, below it the scorecard.
     """
     axes = score.scorecard["axes"]
-    figure = new_figure("page", _HEAD_IN + _ROW_IN * max(1, len(axes)))
-    plot = figure.add_subplot()
     steps = max((len(axis["levels"]) for axis in axes), default=1)
+    card = _card(score, protocol)
+    heights = [0.18 * len(_head(score)) + 0.1, _ROW_IN * max(1, len(axes)) + 0.4, _LINE_IN * (len(card) + 1)]
+    figure = new_figure("page", sum(heights) + _HEAD_IN)
+    grid = figure.add_gridspec(3, 1, height_ratios=heights)
+    plot = figure.add_subplot(grid[1])
     for row, axis in enumerate(axes):
         _draw_levels(plot, row, axis, steps)
     everyone = [score, *others]
     offsets = _offsets(len(everyone))
     for place, (who, colour) in enumerate(zip(everyone, colours(len(everyone)), strict=True)):
-        _draw_marks(
-            plot, who, axes, steps, offsets[place], MARKS[place % len(MARKS)], colour, first=place == 0
-        )
+        mark = MARKS[place % len(MARKS)]
+        _draw_marks(plot, who, axes, steps, offsets[place], mark, colour, first=place == 0)
     _finish(plot, axes, steps)
-    handles, labels = plot.get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside upper left", ncols=4, frameon=False, fontsize=8.0)
+    plot.legend(loc="lower center", bbox_to_anchor=(0.4, 1.0), ncols=4, frameon=False, fontsize=8.0)
+    _write(figure.add_subplot(grid[0]), _head(score))
+    _write_card(figure.add_subplot(grid[2]), card)
     return figure
+
+
+def _head(score: Score) -> list[str]:
+    """Who it is, and the sentence."""
+    content = score.content
+    seeds = f"round {content['seeds']['round']}" if content["seeds"]["round"] else "development seeds"
+    arms = ", ".join(content["arms"])
+    draft = " (draft)" if content["draft"] else ""
+    first = f"{score.name}: robustness passport"
+    second = f"{content['protocol']}{draft}, track {content['track']}, {arms}, {seeds}"
+    return [first, second, *(line for text in sentence(score)[:2] for line in wrap(text, 110))]
+
+
+def _card(score: Score, protocol: ProtocolConfig) -> list[tuple[str, str, str]]:
+    """Label, value and interval of each number of the scorecard."""
+    card = score.scorecard
+    rows = [(figure.label, *figure_told(card["figures"][name])) for name, figure in protocol.figures.items()]
+    rows.append(("ticks later than their period, on this machine", timing_told(score), ""))
+    rows.append(("tuning budget spent", tuning_told(card["tuning"]), ""))
+    return rows
+
+
+def _write(place: "Axes", lines: Sequence[str]) -> None:
+    """Lines of text from the top, the first in bold."""
+    place.axis("off")
+    for number, line in enumerate(lines):
+        weight, size = ("bold", 11.0) if number == 0 else ("normal", 8.0)
+        place.text(0.0, 1.0 - number / len(lines), line, va="top", weight=weight, fontsize=size)
+
+
+def _write_card(place: "Axes", rows: Sequence[tuple[str, str, str]]) -> None:
+    """The scorecard in three columns."""
+    place.axis("off")
+    for number, (label, value, interval) in enumerate([("scorecard", "value", "95 %"), *rows]):
+        height, weight = 1.0 - number / (len(rows) + 1), "bold" if number == 0 else "normal"
+        for x, text, side in ((0.0, label, "left"), (0.55, value, "right"), (0.58, interval, "left")):
+            place.text(x, height, text, va="top", ha=side, weight=weight, fontsize=7.5)
 
 
 def _offsets(count: int) -> list[float]:

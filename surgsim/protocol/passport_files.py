@@ -12,6 +12,8 @@ from surgsim.protocol.score import Score
 from surgsim.recording.files import replacing, write_file
 from surgsim.recording.folders import make_folder
 
+_DOTS_PER_INCH = 220
+
 
 def write_passport(folder: Path, score: Score, others: Sequence[Score], protocol: ProtocolConfig) -> None:
     """Write `passport.pdf`, `passport.png` and `passport.html` into a score's folder.
@@ -20,9 +22,10 @@ def write_passport(folder: Path, score: Score, others: Sequence[Score], protocol
         SurgsimError: If the disk refuses.
     """
     with journal_style():
-        figure = passport_figure(score, others)
+        figure = passport_figure(score, others, protocol)
         contents: dict[str, bytes | str] = {
-            suffix: figure_bytes(figure, Path(f"passport{suffix}")) for suffix in (".pdf", ".png")
+            suffix: figure_bytes(figure, Path(f"passport{suffix}"), _DOTS_PER_INCH)
+            for suffix in (".pdf", ".png")
         }
     contents[".html"] = passport_page(score, others, protocol)
     try:
