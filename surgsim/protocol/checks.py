@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from surgsim.compare.job import REFUSED
 from surgsim.errors import SurgsimError
-from surgsim.protocol.bundle import CODE, ROWS, SCORE, Bundle
+from surgsim.protocol.bundle import CODE, Bundle
 from surgsim.protocol.canonical import sha256_of
 from surgsim.protocol.cells import BASE, Cell, cells
 from surgsim.protocol.definition import Protocol
@@ -16,7 +16,7 @@ from surgsim.protocol.findings import Finding, differences, short
 from surgsim.protocol.freeze import check_frozen, frozen_sha256
 from surgsim.protocol.rows import Row, rows_sha256
 from surgsim.protocol.runs import key_of
-from surgsim.protocol.score import SCHEMA_VERSION
+from surgsim.protocol.score import ROWS, SCHEMA_VERSION, SCORE
 from surgsim.protocol.scorecard import scorecard
 from surgsim.protocol.seeds import seeds_of
 from surgsim.runs.provenance import code_sha256

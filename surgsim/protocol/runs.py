@@ -50,7 +50,8 @@ def compilers() -> dict[str, str]:
 
 def cpu() -> str:
     """Name of the processor that kernels are compiled for."""
-    return str(config.CPU_NAME or binding.get_host_cpu_name())
+    named: str | None = config.CPU_NAME  # type: ignore[attr-defined]  # made when numba starts
+    return named or str(binding.get_host_cpu_name())
 
 
 @dataclass(frozen=True, kw_only=True)
