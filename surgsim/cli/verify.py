@@ -107,10 +107,9 @@ def _print(bundle: "Bundle", found: "Verification") -> None:
     if found.platform:
         print_prose(f"another platform: {'; '.join(each.line for each in found.platform)}")
     if not found.verified:
-        where = f", {again} of {count(total, 'run')} run again" if again else ", nothing run again"
-        print_prose(
-            f"DIFFERS: {count(len(found.findings), 'difference')}{where} (sample {found.effort.sample})."
-        )
+        which = f"{again} of {count(total, 'run')} run again (sample {found.effort.sample})"
+        done = which if again else "no run was done again"
+        print_prose(f"DIFFERS: {count(len(found.findings), 'difference')}, {done}.")
         return
     how = "bit for bit" if found.exact == again else f"within {found.effort.tolerance:g} of what matters"
     which = f"{again} of {count(total, 'run')} run again (sample {found.effort.sample})"

@@ -308,7 +308,7 @@ def test_the_command_verify_says_what_differs_and_what_is_no_bundle(warm, labora
     seen = warm.run(("verify", "forged.zip", *given), tmp_path)
     assert seen.returncode == 1
     assert "file timing.json: SHA-256: " in seen.stdout
-    assert "DIFFERS: 3 differences, nothing run again" in seen.stdout  # its package is not here either
+    assert "DIFFERS: 3 differences, no run was done again." in seen.stdout  # its package is not here either
     told = json.loads(warm.run(("verify", "forged.zip", *given, "--json"), tmp_path).stdout)
     assert (told["verified"], len(told["findings"]), told["run_again"]) == (False, 3, [])
     for words, reason in (
