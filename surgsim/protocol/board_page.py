@@ -41,9 +41,9 @@ def write_board(out: Path, protocol: Protocol, found: Mapping[Path, Score]) -> N
         raise SurgsimError(f"cannot write {out}: {error.strerror or error}") from error
 
 
-def track_sentence(scores: Sequence[Score]) -> str:
+def track_sentence(scores: Sequence[Score], protocol: Protocol) -> str:
     """Who comes furthest, and how many fail before anything is made harder."""
-    best, places = ordered(scores), place_of(scores)
+    best, places = ordered(scores, protocol.config), place_of(scores, protocol.config)
     first = [score.name for score in best if places[id(score)] == 1]
     figure = best[0].scorecard["figures"]["levels_held"]["value"]
     failing = sum(bool(score.scorecard["failures"]) for score in scores)
@@ -54,28 +54,30 @@ def track_sentence(scores: Sequence[Score]) -> str:
     )
 
 
-def _rows(protocol: Protocol, scores: Sequence[Score]) -> list[list[str]]:
-    """Cells of the table, the furthest first."""
-    places = place_of(scores)
+def _rows(protocol: Protocol, scores: Sequence[Score]) -> list[list[tuple[str, str]]]:
+    """Cells of the table, the furthest first: what they say, and what stands beside it."""
+    places = place_of(scores, protocol.config)
     return [
         [
-            str(places[id(score)]),
-            score.name,
-            f"{sum(score.scorecard['failures'].values())} of {score.scorecard['runs']}",
-            *(
-                " ".join(_both(figure_told(score.scorecard["figures"][name])))
-                for name in protocol.config.figures
-            ),
-            timing_told(score),
-            tuning_told(score.scorecard["tuning"]),
+            (str(places[id(score)]), ""),
+            (score.name, ""),
+            (f"{sum(score.scorecard['failures'].values())} of {score.scorecard['runs']}", ""),
+            *(figure_told(score.scorecard["figures"][name]) for name in protocol.config.figures),
+            (timing_told(score), ""),
+            (tuning_told(score.scorecard["tuning"]), ""),
         ]
-        for score in ordered(scores)
+        for score in ordered(scores, protocol.config)
     ]
 
 
-def _both(told: tuple[str, str]) -> list[str]:
+def _cell(told: tuple[str, str]) -> str:
     value, beside = told
-    return [value, f"({beside})"] if beside else [value]
+    return html.escape(value) + (f"<small>{html.escape(beside)}</small>" if beside else "")
+
+
+def _text_cell(told: tuple[str, str]) -> str:
+    value, beside = told
+    return f"{value} ({beside})" if beside else value
 
 
 def _head(protocol: Protocol) -> list[str]:
@@ -104,15 +106,15 @@ def _section(out: Path, protocol: Protocol, track: str, found: Mapping[Path, Sco
     scores = list(found.values())
     places = {id(score): folder for folder, score in found.items()}
     rows = []
-    for cells, score in zip(_rows(protocol, scores), ordered(scores), strict=True):
+    for cells, score in zip(_rows(protocol, scores), ordered(scores, protocol.config), strict=True):
         link = (places[id(score)] / "passport.html").relative_to(out).as_posix()
         name = f'<th scope="row"><a href="{html.escape(link)}">{html.breakable(score.name)}</a></th>'
-        rows.append([cells[0], name, *(html.escape(cell) for cell in cells[2:])])
+        rows.append([_cell(cells[0]), name, *map(_cell, cells[2:])])
     head = [html.heading(label) for label in _head(protocol)]
     return html.section(
         track,
         f"Track {track}",
-        f'<p class="lead">{html.escape(track_sentence(scores))}</p>',
+        f'<p class="lead">{html.escape(track_sentence(scores, protocol))}</p>',
         html.paragraph(f"A controller may know: {protocol.config.tracks[track].description}."),
         html.table(track, head, rows),
     )
@@ -128,11 +130,12 @@ def _text(out: Path, protocol: Protocol, tracks: Mapping[str, Mapping[Path, Scor
     for track, found in tracks.items():
         scores = list(found.values())
         places = {id(score): folder.relative_to(out).as_posix() for folder, score in found.items()}
-        lines += ["", f"## Track {track}", "", track_sentence(scores), ""]
+        lines += ["", f"## Track {track}", "", track_sentence(scores, protocol), ""]
         lines += [f"| {' | '.join(head)} |", f"|{'---|' * len(head)}"]
-        for cells, score in zip(_rows(protocol, scores), ordered(scores), strict=True):
+        for cells, score in zip(_rows(protocol, scores), ordered(scores, protocol.config), strict=True):
             name = f"[`{score.name}`]({places[id(score)]}/passport.html)"
-            lines.append(f"| {' | '.join([cells[0], name, *cells[2:]])} |")
+            texts = [_text_cell(cells[0]), name, *map(_text_cell, cells[2:])]
+            lines.append(f"| {' | '.join(texts)} |")
     return "\n".join(lines) + "\n"
 
 

@@ -15,8 +15,8 @@ if TYPE_CHECKING:
 
 MARKS = ("o", "s", "^", "D", "v", "P", "X")
 """Shapes tell controllers apart where colours do not print."""
-_ROW_IN, _HEAD_IN, _LINE_IN = 0.4, 1.0, 0.17
-_SPREAD = 0.24
+_ROW_IN, _LINE_IN = 0.4, 0.17
+_LEFT, _APART, _RAISED = -0.34, 0.21, 0.12
 
 
 def passport_figure(score: Score, others: Sequence[Score], protocol: ProtocolConfig) -> "Figure":
@@ -28,21 +28,21 @@ def passport_figure(score: Score, others: Sequence[Score], protocol: ProtocolCon
     axes = score.scorecard["axes"]
     steps = max((len(axis["levels"]) for axis in axes), default=1)
     card = _card(score, protocol)
-    heights = [0.18 * len(_head(score)) + 0.1, _ROW_IN * max(1, len(axes)) + 0.4, _LINE_IN * (len(card) + 1)]
-    figure = new_figure("page", sum(heights) + _HEAD_IN)
-    grid = figure.add_gridspec(3, 1, height_ratios=heights)
-    plot = figure.add_subplot(grid[1])
+    heights = [0.19 * len(_head(score)) + 0.15, _ROW_IN * max(1, len(axes)) + 0.7, _LINE_IN * (len(card) + 2)]
+    figure = new_figure("page", sum(heights))
+    parts: Any = figure.subfigures(3, 1, height_ratios=heights)
+    head, chart, foot = parts
+    plot = chart.add_subplot()
     for row, axis in enumerate(axes):
         _draw_levels(plot, row, axis, steps)
     everyone = [score, *others]
-    offsets = _offsets(len(everyone))
     for place, (who, colour) in enumerate(zip(everyone, colours(len(everyone)), strict=True)):
         mark = MARKS[place % len(MARKS)]
-        _draw_marks(plot, who, axes, steps, offsets[place], mark, colour, first=place == 0)
+        _draw_marks(plot, who, axes, steps, _LEFT + _APART * place, mark, colour, first=place == 0)
     _finish(plot, axes, steps)
     plot.legend(loc="lower center", bbox_to_anchor=(0.4, 1.0), ncols=4, frameon=False, fontsize=8.0)
-    _write(figure.add_subplot(grid[0]), _head(score))
-    _write_card(figure.add_subplot(grid[2]), card)
+    _write(head.add_subplot(), _head(score))
+    _write_card(foot.add_subplot(), card)
     return figure
 
 
@@ -54,7 +54,7 @@ def _head(score: Score) -> list[str]:
     draft = " (draft)" if content["draft"] else ""
     first = f"{score.name}: robustness passport"
     second = f"{content['protocol']}{draft}, track {content['track']}, {arms}, {seeds}"
-    return [first, second, *(line for text in sentence(score)[:2] for line in wrap(text, 110))]
+    return [first, second, *(line for text in sentence(score)[:2] for line in wrap(text, 115))]
 
 
 def _card(score: Score, protocol: ProtocolConfig) -> list[tuple[str, str, str]]:
@@ -79,15 +79,8 @@ def _write_card(place: "Axes", rows: Sequence[tuple[str, str, str]]) -> None:
     place.axis("off")
     for number, (label, value, interval) in enumerate([("scorecard", "value", "95 %"), *rows]):
         height, weight = 1.0 - number / (len(rows) + 1), "bold" if number == 0 else "normal"
-        for x, text, side in ((0.0, label, "left"), (0.55, value, "right"), (0.58, interval, "left")):
+        for x, text, side in ((0.0, label, "left"), (0.6, value, "right"), (0.63, interval, "left")):
             place.text(x, height, text, va="top", ha=side, weight=weight, fontsize=7.5)
-
-
-def _offsets(count: int) -> list[float]:
-    """Where in its row each controller's mark stands, the first above."""
-    if count == 1:
-        return [0.0]
-    return [-_SPREAD + 2.0 * _SPREAD * place / (count - 1) for place in range(count)]
 
 
 def _draw_levels(plot: "Axes", row: int, axis: Mapping[str, Any], steps: int) -> None:
@@ -116,12 +109,12 @@ def _draw_marks(
 ) -> None:
     own = {(axis["generator"], axis["axis"]): axis["first_failing"] for axis in who.scorecard["axes"]}
     rows: list[float] = []
-    places: list[int] = []
+    places: list[float] = []
     for row, axis in enumerate(axes):
         key = (axis["generator"], axis["axis"])
         if key in own:
-            rows.append(row + offset)
-            places.append(steps if own[key] is None else own[key])
+            rows.append(row - _RAISED)
+            places.append(offset + (steps if own[key] is None else own[key]))
     if first:
         for height, place in zip(rows, places, strict=True):
             plot.plot([-0.48, place], [height, height], color=colour, linewidth=1.4, zorder=1)

@@ -66,7 +66,11 @@ def _axes_section(score: Score, others: Sequence[Score]) -> str:
     )
     rows = "\n".join(_axis(axis, everyone) for axis in axes)
     return html.section(
-        "axes", "First failing level", html.paragraph(told), f'<ul class="legend">{legend}</ul>', rows
+        "axes",
+        "First failing level",
+        html.paragraph(told),
+        f'<ul class="legend">{legend}</ul>',
+        f'<div class="axes">{rows}</div>',
     )
 
 

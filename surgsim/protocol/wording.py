@@ -40,7 +40,7 @@ def figure_told(figure: Mapping[str, Any]) -> tuple[str, str]:
     """A figure's value and interval: `0.51`, `0.4 to 0.6`."""
     value, low, high = figure["value"], figure["low"], figure["high"]
     if value is None:
-        return "-", figure["note"] or "no value"
+        return "-", (figure["note"] or "no value").partition(",")[0]
     if low is None and high is None:
         return number(value, 3), ""
     upper = "open" if high is None else number(high, 3)

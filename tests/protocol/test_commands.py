@@ -76,4 +76,4 @@ def test_what_is_wrong_is_told(warm, tmp_path, words, told):
 
 def test_development_seeds_are_shown(warm, tmp_path):
     done = warm.run(["seeds", "show", "--round", "development", "--generator", "loads"], folder=tmp_path)
-    assert done.stdout == "loads: 0, 1, 2, 3\n"
+    assert done.stdout == "loads: 0, 1, 2, 3, 4, 5\n"

@@ -126,7 +126,7 @@ def test_a_baseline_of_more_arms_is_cut_to_those_of_the_score(scored, whole):
 
 
 def test_who_is_not_told_apart_shares_a_place(whole):
-    _, made, _ = whole
+    protocol, made, _ = whole
 
     def like(name, held, done):
         figures = {**made.scorecard["figures"], "levels_held": {"value": held}, "done": {"value": done}}
@@ -135,9 +135,9 @@ def test_who_is_not_told_apart_shares_a_place(whole):
         return replace(made, content={**made.content, "scorecard": card, "controller": controller})
 
     scores = [like("d", None, 0.0), like("b", 0.80, 0.7), like("a", 0.82, 0.72), like("c", 0.7, 1.0)]
-    places = place_of(scores)
-    assert [score.name for score in ordered(scores)] == ["a", "b", "c", "d"]
-    assert [places[id(score)] for score in ordered(scores)] == [1, 1, 3, 4]
+    places, best = place_of(scores, protocol.config), ordered(scores, protocol.config)
+    assert [score.name for score in best] == ["a", "b", "c", "d"]
+    assert [places[id(score)] for score in best] == [1, 1, 3, 4]
 
 
 def test_words_say_failures_first(whole):
