@@ -20,7 +20,7 @@ from surgsim.scenario.schema import Scenario
 from surgsim.simulate.setup import Setup
 from surgsim.trace.trace import Ending, Trace, TraceMeta, base_blocks
 
-pytest_plugins = ["left_out", "warm"]
+pytest_plugins = ["laboratory", "left_out", "warm"]
 
 
 @pytest.fixture(scope="session", autouse=True)

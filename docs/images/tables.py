@@ -1,4 +1,4 @@
-"""Writes the tables of the documents that come from `results/leaderboard`, between their marks in the pages.
+"""Writes the tables of the documents that come from kept figures, between their marks in the pages.
 
 A table stands in a page between `<!-- table NAME -->` and `<!-- end -->`. `tests/test_made.py` holds pages
 against the results.
@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import compared
 import numpy as np
 import pyarrow.parquet as pq
 from ruamel.yaml import YAML
@@ -23,6 +24,7 @@ PAGES = (
     "docs/robustness.md",
     "docs/drives.md",
     "docs/baselines.md",
+    "docs/statistics.md",
     "docs/peg_and_ring.md",
     "results/leaderboard/README.md",
 )
@@ -306,6 +308,9 @@ def _studies() -> str:
 
 
 TABLES: dict[str, Callable[[], str]] = {
+    "margins": lambda: table(*compared.margins()),
+    "coverage": lambda: table(*compared.coverage()),
+    "coverage_of_rates": lambda: table(*compared.coverage_of_rates()),
     "nominal": _nominal,
     "studies": _studies,
     "theatre_short": _theatre_short,

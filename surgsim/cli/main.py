@@ -25,6 +25,11 @@ COMMANDS = (
     "list",
     "compare",
     "tune",
+    "score",
+    "seeds",
+    "submit",
+    "verify",
+    "protocol",
     "report",
     "inspect",
     "export",
@@ -45,6 +50,8 @@ _EPILOG = """examples:
   surgsim compare quick                scenarios, controllers and seeds
   surgsim tune vprnn --scenario circle_panda --budget 300
                                        better gains for a controller
+  surgsim score rcm_inverse_dynamics   a controller through the frozen protocol
+  surgsim verify mine.zip              somebody's score, checked and run again
   surgsim inspect runs/circle_lwr4plus/vprnn-seed0 --view
 """
 

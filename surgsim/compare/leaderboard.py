@@ -31,7 +31,7 @@ class LeaderboardRow:
         value: Interquartile mean of the metric over completed runs, in its unit.
         score: Interquartile mean of the normalised score: 1 is the best controller of each setting.
         rank: Mean rank over scenarios, failures last.
-        place: One, plus the controllers that are better; None where places were not asked for.
+        place: One, plus the controllers that fail less or are better; None where places were not asked for.
     """
 
     controller: str
@@ -54,7 +54,7 @@ class LeaderboardRow:
 
 
 def leaderboard(table: pa.Table | Observations, metric: str, *, places: bool = True) -> list[LeaderboardRow]:
-    """Rows for `metric`, the best mean rank first.
+    """Rows for `metric`, the best place first, then the best mean rank.
 
     Args:
         table: The batch.
@@ -99,7 +99,7 @@ def _row(
     )
 
 
-def _order(row: LeaderboardRow) -> tuple[float, float, str]:
-    """Best mean rank first, then the best score; what has neither comes last."""
+def _order(row: LeaderboardRow) -> tuple[float, float, float, str]:
+    """Best place first, then the best mean rank, then the best score; what has neither comes last."""
     keys = [np.inf if figure.value is None else figure.value for figure in (row.rank, row.score)]
-    return (keys[0], keys[1], row.controller)
+    return (row.place or 0, keys[0], keys[1], row.controller)

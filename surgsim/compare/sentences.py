@@ -27,11 +27,11 @@ def _finding(a: str, b: str, metric: Metric, pairs: Pairs, difference: Interval,
             return _too_few(a, b, metric, pairs, difference)
         case Verdict.EQUAL:
             return f"No difference: {a} and {b} give the same value with every seed."
-        case Verdict.NO_DIFFERENCE:
-            return f"No difference detected: {with_unit(value, bracket(difference))} {unit}".rstrip() + "."
-        case Verdict.NO_MATTER:
+        case Verdict.NOT_TOLD_APART:
+            return f"{_not_told_apart(pairs, difference, unit)}."
+        case Verdict.EQUIVALENT:
             size = f"{with_unit(value, bracket(difference))} {unit}".rstrip()
-            return f"No difference that matters: {size}, less than {least}{_still(pairs)}."
+            return f"Equivalent: {size}, inside ±{least}{_still(pairs)}."
     by = f"{with_unit(abs(value), unit)}{_relative(pairs)}"
     by += f" {_absolute(difference)}" if not difference.note else ", seeds do not matter"
     by += _unless(pairs, value)
@@ -41,6 +41,14 @@ def _finding(a: str, b: str, metric: Metric, pairs: Pairs, difference: Interval,
         if verdict is Verdict.PERHAPS
         else f"{found}."
     )
+
+
+def _not_told_apart(pairs: Pairs, difference: Interval, unit: str) -> str:
+    """That the interval holds zero, and how large a difference it still allows."""
+    size = f"{with_unit(difference.value, bracket(difference))} {unit}".rstrip()
+    if not pairs.matters:
+        return f"Not told apart: {size}"
+    return f"Not told apart, nor equivalent within ±{exactly(pairs.matters, unit)}: {size}"
 
 
 def side(metric: Metric, difference: float) -> str:

@@ -10,6 +10,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
+from scipy import stats
 
 from surgsim.compare.intervals import (
     NOTHING,
@@ -66,6 +67,15 @@ class Comparison:
     improvement: Interval
     verdict: Verdict
     sentence: str
+
+
+def chance_of_failures(found: Comparison) -> float:
+    """Probability of failures as unequal as these, or more so, if both controllers failed alike.
+
+    The exact test of McNemar: of the pairs in which one alone failed, each is as likely to be either's.
+    """
+    alone = [found.left_out.get(f"{name} failed", 0) for name in (found.a, found.b)]
+    return float(stats.binomtest(alone[0], sum(alone), 0.5).pvalue) if sum(alone) else 1.0
 
 
 def compare_pair(runs: Observations, a: str, b: str, metric: str, scenario: str | None = None) -> Comparison:

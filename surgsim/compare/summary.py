@@ -7,7 +7,7 @@ from surgsim.compare.failures import Failing, failing
 from surgsim.compare.leaderboard import LeaderboardRow
 from surgsim.compare.observations import Observations, metric_named
 from surgsim.compare.sentences import side
-from surgsim.compare.statistics import Comparison, compare_pair
+from surgsim.compare.statistics import Comparison, chance_of_failures, compare_pair
 from surgsim.compare.verdict import Verdict
 from surgsim.compare.wording import exactly, heading_of, listed, number, seeds_of, with_unit
 from surgsim.metrics.metric import Metric
@@ -102,10 +102,31 @@ def _by_how_much(found: Comparison, metric: Metric, matters: float, several: boo
         return f"of the next, {found.b}{also}, no run completed beside one of {found.a}."
     best = f"{found.a} with " if several else ""
     text = f"{best}{with_unit(found.mean_a, unit)} on average. Next comes {found.b}{also}"
-    if found.verdict in (Verdict.NO_DIFFERENCE, Verdict.NO_MATTER, Verdict.PERHAPS):  # failures decide
-        return f"{text} with {with_unit(found.mean_b, unit)}. {found.sentence}"
+    if found.verdict in (Verdict.NOT_TOLD_APART, Verdict.EQUIVALENT, Verdict.PERHAPS):  # failures decide
+        decided = f" Failures decide{_by_chance(found)}." if found.failed_a != found.failed_b else ""
+        return f"{text} with {with_unit(found.mean_b, unit)}. {found.sentence}{decided}"
     size = f"{with_unit(abs(value), unit)} {side(metric, -value)}{_ratio(found, metric, matters)}"
-    return f"{text} with {with_unit(found.mean_b, unit)}, {size}{_how_sure(found, unit)}."
+    return (
+        f"{text} with {with_unit(found.mean_b, unit)}, {size}{_how_sure(found, unit)}.{_failing_more(found)}"
+    )
+
+
+def _failing_more(found: Comparison) -> str:
+    """That the second fails more often, which puts it behind whatever its figures."""
+    if found.failed_a != found.failed_b:
+        counts = f"{found.failed_b} of its paired runs against {found.failed_a}"
+        return f" {found.b} fails more often: {counts}{_by_chance(found)}."
+    if found.not_done_a != found.not_done_b:
+        counts = f"in {found.not_done_b} paired runs against {found.not_done_a}"
+        return f" {found.b} misses its task more often: {counts}."
+    return ""
+
+
+def _by_chance(found: Comparison) -> str:
+    """How likely the failures are so unequal by chance; empty where they are equal."""
+    if found.failed_a == found.failed_b:
+        return ""
+    return f" (p = {number(chance_of_failures(found), 2)} by chance alone)"
 
 
 def _ratio(found: Comparison, metric: Metric, matters: float) -> str:

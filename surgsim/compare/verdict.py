@@ -12,8 +12,8 @@ class Verdict(enum.Enum):
     BETTER = "better"
     WORSE = "worse"
     PERHAPS = "different, but perhaps by less than matters"
-    NO_DIFFERENCE = "no difference detected"
-    NO_MATTER = "no difference that matters"
+    NOT_TOLD_APART = "not told apart"
+    EQUIVALENT = "equivalent"
     EQUAL = "equal"
     DIFFERENT = "different, and the metric has no better side"
     TOO_FEW = "too few pairs"
@@ -22,8 +22,12 @@ class Verdict(enum.Enum):
 def verdict_of(metric: Metric, difference: Interval, scale: float, matters: float) -> Verdict:
     """The verdict on a difference, first less second.
 
-    With m the smallest difference that matters: no difference that matters if the whole interval lies inside
-    (-m, m), a difference if the whole interval lies on one side of both 0 and m.
+    With m the smallest difference that matters, which is the margin of equivalence: equivalent if the whole
+    interval lies inside (-m, m), a difference if the whole interval lies on one side of both 0 and m. With a
+    95 % interval the first is the two one-sided tests, each at 2.5 %. An interval that holds 0 and reaches m
+    says neither: the two are not told apart, which is no finding that they are alike.
+
+    Source: Schuirmann, J. Pharmacokinetics and Biopharmaceutics 15, 1987 (two one-sided tests).
 
     Args:
         metric: Says which side is better.
@@ -39,11 +43,11 @@ def verdict_of(metric: Metric, difference: Interval, scale: float, matters: floa
         if abs(value) <= 1e-12 * scale:
             return Verdict.EQUAL
     if low is None or high is None:
-        return Verdict.NO_DIFFERENCE
+        return Verdict.NOT_TOLD_APART
     if max(abs(low), abs(high)) < matters:
-        return Verdict.NO_MATTER
+        return Verdict.EQUIVALENT
     if low <= 0.0 <= high:
-        return Verdict.NO_DIFFERENCE
+        return Verdict.NOT_TOLD_APART
     if metric.lower_is_better is None:
         return Verdict.DIFFERENT
     if min(abs(low), abs(high)) < matters:

@@ -89,10 +89,10 @@ def new_figure(width: str, height_in: float) -> "Figure":
     return figure
 
 
-def figure_bytes(figure: "Figure", path: Path) -> bytes:
+def figure_bytes(figure: "Figure", path: Path, dots_per_inch: int = _DOTS_PER_INCH) -> bytes:
     """The figure as the file that `path` names; the same figure gives the same bytes."""
     suffix, content = path.suffix.lower(), io.BytesIO()
-    figure.savefig(content, format=suffix[1:], dpi=_DOTS_PER_INCH, metadata=_METADATA[suffix])
+    figure.savefig(content, format=suffix[1:], dpi=dots_per_inch, metadata=_METADATA[suffix])
     return content.getvalue()
 
 

@@ -12,7 +12,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from surgsim.metrics.metric import CHOICE, REPEATABILITY, Metric, with_block
+from surgsim.metrics.metric import CHOICE, REPEATABILITY, STEADY_HAND, Metric, with_block
 from surgsim.trace.trace import Trace
 
 CONVERGED_TIP_M = 1e-3
@@ -61,7 +61,7 @@ METRICS = (
         name="tip_error_rms_mm",
         heading="tip error, RMS [mm]",
         matters=0.1,
-        matters_source=REPEATABILITY,
+        matters_source=STEADY_HAND,
         meaning="RMS distance of the true tip from its command at the same tick",
         compute=lambda trace: 1e3 * rms(trace["tip_error_m"]),
     ),
@@ -69,7 +69,7 @@ METRICS = (
         name="tip_error_max_mm",
         heading="tip error, largest [mm]",
         matters=0.1,
-        matters_source=REPEATABILITY,
+        matters_source=STEADY_HAND,
         meaning="largest distance of the true tip from its command",
         compute=lambda trace: 1e3 * float(np.max(trace["tip_error_m"])),
     ),
@@ -77,7 +77,7 @@ METRICS = (
         name="tip_error_end_mm",
         heading="tip error at the end [mm]",
         matters=0.1,
-        matters_source=REPEATABILITY,
+        matters_source=STEADY_HAND,
         meaning="distance of the true tip from its command at the end",
         compute=lambda trace: 1e3 * float(trace["tip_error_m"][-1]),
     ),
@@ -101,7 +101,7 @@ METRICS = (
         name="tip_control_error_rms_mm",
         heading="tip error as the controller sees it, RMS [mm]",
         matters=0.1,
-        matters_source=REPEATABILITY,
+        matters_source=STEADY_HAND,
         meaning="RMS distance of the tip from its command, by nominal model and measured joints",
         compute=with_block("tip_believed", lambda trace: of_asked(rms, tip_control_error_m(trace))),
     ),
@@ -109,7 +109,7 @@ METRICS = (
         name="tip_control_error_max_mm",
         heading="tip error as the controller sees it, largest [mm]",
         matters=0.1,
-        matters_source=REPEATABILITY,
+        matters_source=STEADY_HAND,
         meaning="largest distance of the tip from its command, by nominal model and measured joints",
         compute=with_block("tip_believed", lambda trace: of_asked(largest, tip_control_error_m(trace))),
     ),

@@ -9,7 +9,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from surgsim.metrics.metric import CHOICE, FORCE_RESOLUTION, Metric, with_block
+from surgsim.metrics.metric import FORCE_RESOLUTION, PEG_TRANSFER_SECOND, Metric, with_block
 from surgsim.trace.trace import Trace
 
 GRASPED, ON_TARGET = 1.0, 2.0
@@ -77,7 +77,7 @@ METRICS = (
         name="transfer_time_s",
         heading="time for a ring, mean [s]",
         matters=0.1,
-        matters_source=CHOICE,
+        matters_source=PEG_TRANSFER_SECOND,
         meaning="mean time from a ring's first grasp until it rests on its target peg",
         compute=_of_board(transfer_time_s),
     ),

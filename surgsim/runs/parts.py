@@ -64,6 +64,12 @@ def externals_of(scenario: Experiment) -> dict[str, dict[str, str] | None]:
     return dict(sorted(found.items()))
 
 
+def external_names(controller: BaseModel) -> list[str]:
+    """Names of the external controllers that a controller consists of."""
+    parts = (part for part in _parts(controller) if isinstance(part, ExternalConfig | ExternalLawConfig))
+    return sorted({part.name for part in parts})
+
+
 def _declared(part: ExternalConfig | ExternalLawConfig, scenario: Scenario) -> dict[str, str]:
     """What an external controller says of itself."""
     told = last_declared(command_for(part.name))

@@ -46,10 +46,15 @@ def provenance_of(scenario: Experiment) -> dict[str, Any]:
     """
     parts = {"plugins": plugins_of(scenario), "policies": policies_of(scenario)}
     told = {**provenance(), **parts, "externals": externals_of(scenario)}
-    return {**told, "code_sha256": _code_sha256(told), "scenario_sha256": scenario.sha256()}
+    return {**told, "code_sha256": code_sha256(told), "scenario_sha256": scenario.sha256()}
 
 
-def _code_sha256(told: Mapping[str, Any]) -> str:
+def code_sha256(told: Mapping[str, Any]) -> str:
+    """One hash of all that a result follows from beside its scenario.
+
+    Args:
+        told: `sources_sha256`, `packages`, `plugins`, `policies` and `externals`, as in `provenance_of`.
+    """
     packages = {name: told["packages"][name] for name in told["packages"] if name not in _OF_NO_CONSEQUENCE}
     code = [told["sources_sha256"], packages, told["plugins"], told["policies"], told["externals"]]
     return hashlib.sha256(json.dumps(code, sort_keys=True).encode()).hexdigest()

@@ -10,8 +10,9 @@ from surgsim.compare.aggregates import ranks, scores
 from surgsim.compare.leaderboard import leaderboard
 from surgsim.compare.matters import checked_matters, parse_matters
 from surgsim.compare.places import places_of
-from surgsim.compare.statistics import compare_pair
+from surgsim.compare.statistics import chance_of_failures, compare_pair
 from surgsim.compare.suite import SuiteConfig, with_changes
+from surgsim.compare.summary import summary
 from surgsim.compare.verdict import Verdict
 from surgsim.errors import SurgsimError
 from surgsim.metrics.catalog import METRICS
@@ -31,11 +32,11 @@ def one(value):
 @pytest.mark.parametrize(
     ("shift", "spread", "verdict", "sentence"),
     [
-        (-7e-4, 0.001, Verdict.NO_MATTER, "No difference that matters: −6.99e−4 [−7"),
+        (-7e-4, 0.001, Verdict.EQUIVALENT, "Equivalent: −6.99e−4 [−7"),
         (0.5, 1.0, Verdict.WORSE, "a is worse than b by 0.501 mm (+50 %) [0.4"),
         (-0.5, 1.0, Verdict.BETTER, "a is better than b by 0.499 mm (−50 %) [0.4"),
         (0.1, 1.0, Verdict.PERHAPS, "a is worse than b by 0.101 mm (+10 %) [0.08"),
-        (0.0, 20.0, Verdict.NO_DIFFERENCE, "No difference detected: 0.0167 [−"),
+        (0.0, 20.0, Verdict.NOT_TOLD_APART, "Not told apart, nor equivalent within ±0.1 mm: 0.0167 [−"),
     ],
 )
 def test_the_verdict_asks_whether_a_difference_matters(runs_of, shift, spread, verdict, sentence):
@@ -45,16 +46,16 @@ def test_the_verdict_asks_whether_a_difference_matters(runs_of, shift, spread, v
     assert found.sentence.startswith(sentence)
     if verdict is Verdict.PERHAPS:
         assert found.sentence.endswith("; whether by 0.1 mm, the least that matters, is open.")
-    if verdict is Verdict.NO_MATTER:
-        assert found.sentence.endswith(" mm, less than 0.1 mm.")
+    if verdict is Verdict.EQUIVALENT:
+        assert found.sentence.endswith(" mm, inside ±0.1 mm.")
 
 
 def test_a_mean_that_does_not_matter_names_the_scenarios_in_which_it_does(runs_of):
     up, down = line(1.3 + NOISE, "s"), line(0.7 + NOISE, "t")
     given = {"a": up | down, "b": line(np.ones(6), "s") | line(np.ones(6), "t")}
     found = compare_pair(runs_of(given, matters=0.1), "a", "b", TIP)
-    assert found.verdict is Verdict.NO_MATTER
-    assert found.sentence.endswith("less than 0.1 mm, but not in 2 of 2 scenarios.")
+    assert found.verdict is Verdict.EQUIVALENT
+    assert found.sentence.endswith("inside ±0.1 mm, but not in 2 of 2 scenarios.")
 
 
 def test_one_seed_says_what_was_seen_and_no_interval(runs_of):
@@ -114,6 +115,30 @@ def test_who_is_not_told_apart_shares_a_place(runs_of):
     assert [row.place for row in leaderboard(runs_of(given), TIP, places=False)] == [None] * 4
 
 
+def test_who_fails_more_comes_after_whatever_its_figures(runs_of):
+    given = {
+        "accurate": line([0.1] * 18) | {("s", 18): "diverged", ("s", 19): "diverged"},
+        "steady": line(5.0 + 0.1 * np.arange(20)),
+        "once": line(np.full(19, 0.2)) | {("s", 19): "rcm_limit"},
+    }
+    runs = runs_of(given, matters=0.1)
+    assert places_of(runs, TIP) == {"steady": 1, "once": 2, "accurate": 3}
+    assert [row.controller for row in leaderboard(runs, TIP)] == ["steady", "once", "accurate"]
+    found = compare_pair(runs, "accurate", "steady", TIP)
+    assert found.verdict is Verdict.BETTER  # of the runs that it completed
+    assert chance_of_failures(found) == 0.5  # two pairs in which one alone failed: (1 + 1)/4
+    told = summary(runs, TIP, leaderboard(runs, TIP)).first
+    assert told.endswith(" once fails more often: 1 of its paired runs against 0 (p = 1.0 by chance alone).")
+
+
+def test_who_misses_the_task_more_often_comes_after(runs_of):
+    runs = runs_of({"near": line(np.full(6, 0.1)), "far": line(5.0 + NOISE)}, matters=0.1)
+    runs = replace(runs, success=np.array([1.0] * 5 + [0.0] + [1.0] * 6))
+    assert places_of(runs, TIP) == {"far": 1, "near": 2}
+    told = summary(runs, TIP, leaderboard(runs, TIP)).first
+    assert told.endswith(" near misses its task more often: in 1 paired runs against 0.")
+
+
 def test_one_seed_gives_places_by_what_was_seen(runs_of):
     assert places_of(runs_of({"a": one(1.0), "b": one(1.05), "c": one(4.0)}, matters=0.1), TIP) == {
         "a": 1, "b": 1, "c": 3
@@ -129,8 +154,10 @@ def test_every_metric_says_what_matters_and_is_headed_by_words(metric):
     wanted = next((told for suffix, told in units.items() if metric.name.endswith(suffix)), None)
     assert wanted is None or unit == f"{wanted}]"
     assert metric.matters >= 0.0
-    assert metric.matters_source
-    assert (metric.matters == 0.0) == (metric.matters_source == "any difference counts")
+    source = metric.matters_source
+    assert source.text
+    assert (metric.matters == 0.0) == (source.kind == "none")
+    assert bool(source.reference) == (source.kind in ("clinical", "instrument"))
 
 
 def test_the_command_line_says_what_matters():

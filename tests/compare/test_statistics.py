@@ -49,8 +49,8 @@ def test_direction_comes_from_the_metric(runs_of):
 def test_no_difference_detected_is_said_in_words(runs_of):
     runs = runs_of({"a": line(1.0, 2.0, 3.0, 4.0, 5.0), "b": line(2.0, 1.0, 3.5, 3.5, 5.0)})
     found = compare_pair(runs, "a", "b", TIP)
-    assert found.verdict is Verdict.NO_DIFFERENCE
-    assert found.sentence.startswith("No difference detected: 0 [−")
+    assert found.verdict is Verdict.NOT_TOLD_APART
+    assert found.sentence.startswith("Not told apart: 0 [−")
     assert found.improvement.value == pytest.approx(0.5)  # two wins, two losses and a tie
 
 
@@ -174,7 +174,7 @@ def test_paired_comparison_covers_a_known_effect_and_seldom_invents_one(runs_of)
         })  # fmt: skip
         effect = compare_pair(runs, "a", "c", TIP)
         covered += effect.difference.low <= -0.3 <= effect.difference.high
-        invented += compare_pair(runs, "a", "b", TIP).verdict is not Verdict.NO_DIFFERENCE
+        invented += compare_pair(runs, "a", "b", TIP).verdict is not Verdict.NOT_TOLD_APART
     assert 0.90 <= covered / 300 <= 0.99
     assert 0.01 <= invented / 300 <= 0.10
 

@@ -74,7 +74,7 @@ def test_a_controller_that_fails_does_not_win_by_the_runs_that_it_completed(runs
 def test_what_does_not_matter_is_said_with_its_source(runs_of):
     runs = replace(runs_of({"a": seeds(1.0)}), smallest={})
     assert told(runs).least.startswith(
-        "By tip error, RMS, controllers less than 0.1 mm apart count as equal; that is how well the arms come"
+        "By tip error, RMS, controllers less than 0.1 mm apart count as equal; that is how still surgeons"
     )
     assert told(replace(runs, smallest={TIP: 0.3})).least.endswith(
         "less than 0.3 mm apart count as equal; set for this batch."

@@ -34,6 +34,11 @@ COMMANDS = {
     "inspect garbage": ["inspect", "garbage.rrd"],
     "reproduce": ["reproduce", "vprn"],
     "tune": ["tune", "vprn", "--scenario", GOOD, "--budget", "9"],
+    "submit folder": ["submit", "."],
+    "verify zeros": ["verify", "/dev/zero"],
+    "verify png": ["verify", "picture.yaml"],
+    "verify empty": ["verify", "empty.rrd", "--json"],
+    "verify pipe": ["verify", "."],
 }
 COLD = (
     "check pipe",
@@ -43,6 +48,8 @@ COLD = (
     "inspect garbage",
     "reproduce",
     "tune",
+    "submit folder",
+    "verify zeros",
 )
 """One of each command, which a process has to start for first; the others are forks of a warm one."""
 

@@ -45,6 +45,11 @@ def _may_mount() -> bool:
     return shutil.which("unshare") is not None and not subprocess.run(command, capture_output=True).returncode
 
 
+def _may_be_alone() -> bool:
+    command = ["unshare", "--map-root-user", "--net", "true"]
+    return shutil.which("unshare") is not None and not subprocess.run(command, capture_output=True).returncode
+
+
 def _draws() -> bool:
     return any(ctypes.util.find_library(name) for name in ("EGL", "OSMesa"))
 
@@ -61,6 +66,7 @@ PARTS = {
     "opengl": Part("drawing", _draws, "neither EGL nor OSMesa"),
     "display": Part("window", lambda: shutil.which("Xvfb") is not None, "no Xvfb on the PATH"),
     "compiler": Part("C", lambda: shutil.which("cc") is not None, "no C compiler on the PATH"),
+    "namespace": Part("no-network", _may_be_alone, "this system lets us make no network namespace"),
     "mount": Part("full-disk", _may_mount, "this system lets us mount no small disk"),
 }
 

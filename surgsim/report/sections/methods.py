@@ -35,7 +35,7 @@ def methods_section(results: Results) -> str:
 def _metric(results: Results, metric: Metric) -> list[str]:
     """A row of the table of metrics."""
     matters, unit = results.runs.matters(metric.name), heading_of(metric)[1]
-    source = metric.matters_source if matters == metric.matters else "set for this batch"
+    source = str(metric.matters_source) if matters == metric.matters else "set for this batch"
     least = f"{html.escape(exactly(matters, unit))}<small>{html.escape(source)}</small>" if matters else "any"
     name = f"<small><code>{html.breakable(metric.name)}</code></small>"
     return [

@@ -1,0 +1,118 @@
+"""What a protocol's name stands for, a hash for each part of it."""
+
+import hashlib
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import Any
+
+from surgsim.errors import ScenarioError, SurgsimError
+from surgsim.protocol.canonical import sha256_of
+from surgsim.protocol.cells import cells_of, reference
+from surgsim.protocol.definition import Protocol, entry_file
+from surgsim.protocol.seeds import Seeds
+from surgsim.resources import resource_dir
+from surgsim.runs.sources import ROOT, hash_of
+from surgsim.scenario.load import load_controller
+
+PROBE = "0" * 64
+"""Key of the seed with which scenarios are made that stand for all of a generator."""
+_CODE = (
+    "metrics",
+    "verdict.py",
+    "tasks/success.py",
+    "tasks/teleoperation_program.py",
+    "scenario/thresholds.py",
+)
+_SCORE = ("canonical.py", "cells.py", "figures.py", "levels.py", "rows.py", "scorecard.py", "seeds.py")
+Items = dict[str, str]
+
+
+def all_items(protocol: Protocol) -> Items:
+    """Hashes of everything, by name: definition, scenarios, assets, metrics, score, entries.
+
+    Raises:
+        SurgsimError: If the protocol makes a scenario that is not valid, or names a controller that is not.
+    """
+    config = protocol.config
+    found = items_of(protocol, list(config.generators), list(config.arms))
+    for title, track in config.tracks.items():
+        for scheme in track.schemes:
+            found[f"scheme/{title}/{scheme}"] = _scheme(protocol, title, scheme)
+        for name in track.entries:
+            found.setdefault(
+                f"entry/{name}", sha256_of(load_controller(entry_file(name)).model_dump(mode="json"))
+            )
+    return dict(sorted(found.items()))
+
+
+def items_of(protocol: Protocol, generators: Sequence[str], arms: Sequence[str]) -> Items:
+    """Hashes of what a score of these generators and arms follows from."""
+    told = protocol.config.model_dump(mode="json", exclude={"draft", "generators"})
+    found = {f"definition/{key}": sha256_of(value) for key, value in told.items()}
+    for generator in generators:
+        config = protocol.config.generators[generator]
+        found[f"definition/generators/{generator}"] = sha256_of(config.model_dump(mode="json"))
+        for arm in arms:
+            found[f"scenario/{generator}/{arm}"] = _scenarios(protocol, generator, arm)
+    found.update(_assets(arms))
+    found.update(_code())
+    return found
+
+
+def protocol_sha256(items: Items) -> str:
+    """One hash of all of a protocol's items."""
+    return sha256_of(items)
+
+
+def _scenarios(protocol: Protocol, generator: str, arm: str) -> str:
+    """Hash of complete scenarios, every default in them, at every level: for a seed that stands for all."""
+    seeds = Seeds(kind="probe", key=PROBE)
+    hashes: dict[str, Any] = {}
+    try:
+        for cell in cells_of(protocol, generator, arm, seeds, reference(), most_seeds=1):
+            if cell.scenario is not None:
+                hashes[f"{cell.axis}={cell.level}"] = cell.scenario.sha256()
+    except ScenarioError as error:
+        raise SurgsimError(f"{protocol.path}: generator {generator}, arm {arm}: {error}") from error
+    return sha256_of(hashes)
+
+
+def _scheme(protocol: Protocol, track: str, scheme: str) -> str:
+    """Hash of complete scenarios of a track's scheme."""
+    seeds, settings = Seeds(kind="probe", key=PROBE), protocol.settings_of(track, scheme)
+    hashes = [
+        cell.scenario.sha256()
+        for generator in protocol.track(track).generators
+        for arm in protocol.config.arms
+        for cell in cells_of(protocol, generator, arm, seeds, reference(), settings, most_seeds=1)
+        if cell.scenario is not None
+    ]
+    return sha256_of(hashes)
+
+
+def _assets(arms: Sequence[str]) -> Items:
+    """Hashes of the arms' folders and of what all arms share."""
+    root = resource_dir("assets")
+    folders = [f"robots/{arm}" for arm in arms] + ["instruments", "theatre", "trocar", "console"]
+    return {f"asset/{name}": hash_of(_files(root / name)) for name in folders}
+
+
+def _code() -> Items:
+    """Hashes of the modules that make figures of a trace, and of those that make a scorecard of figures."""
+    found = {}
+    for name in _CODE:
+        place = ROOT / name
+        for path in sorted(place.glob("*.py")) if place.is_dir() else [place]:
+            found[f"metric/{path.relative_to(ROOT).as_posix()}"] = _file(path)
+    here = Path(__file__).parent
+    return {**found, **{f"score/{name}": _file(here / name) for name in _SCORE}}
+
+
+def _file(path: Path) -> str:
+    return hashlib.sha256(path.read_bytes()).hexdigest()
+
+
+def _files(folder: Path) -> Iterable[tuple[str, Path]]:
+    for path in folder.rglob("*"):
+        if path.is_file() and "__pycache__" not in path.parts:
+            yield path.relative_to(folder).as_posix(), path

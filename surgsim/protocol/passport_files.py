@@ -1,0 +1,37 @@
+"""The passport's files: a page, and its chart for print."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from surgsim.errors import SurgsimError
+from surgsim.export.paper_style import figure_bytes, journal_style
+from surgsim.protocol.definition import ProtocolConfig
+from surgsim.protocol.passport import passport_figure
+from surgsim.protocol.passport_page import passport_page
+from surgsim.protocol.score import Score
+from surgsim.recording.files import replacing, write_file
+from surgsim.recording.folders import make_folder
+
+_DOTS_PER_INCH = 220
+
+
+def write_passport(folder: Path, score: Score, others: Sequence[Score], protocol: ProtocolConfig) -> None:
+    """Write `passport.pdf`, `passport.png` and `passport.html` into a score's folder.
+
+    Raises:
+        SurgsimError: If the disk refuses.
+    """
+    with journal_style():
+        figure = passport_figure(score, others, protocol)
+        contents: dict[str, bytes | str] = {
+            suffix: figure_bytes(figure, Path(f"passport{suffix}"), _DOTS_PER_INCH)
+            for suffix in (".pdf", ".png")
+        }
+    contents[".html"] = passport_page(score, others, protocol)
+    try:
+        make_folder(folder)
+        for suffix, content in contents.items():
+            with replacing(folder / f"passport{suffix}") as draft:
+                write_file(draft, content)
+    except OSError as error:
+        raise SurgsimError(f"cannot write {folder}: {error.strerror or error}") from error
