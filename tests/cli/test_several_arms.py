@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
+import rerun.blueprint as rrb
 from rerun.chunk import RrdReader
 
 import surgsim
@@ -15,6 +16,7 @@ from surgsim.compare.job import REFUSED, Job, do
 from surgsim.compare.table import Row, read_rows
 from surgsim.export.overlay import figures
 from surgsim.metrics.catalog import METRICS, evaluate, of_one_arm
+from surgsim.recording.blueprint import blueprint
 from surgsim.recording.read import read_recording
 from surgsim.recording.replay import Replay
 from surgsim.recording.scene import rebuild_all, scenario_of
@@ -98,6 +100,27 @@ def test_the_recording_has_both_arms_ports_paths_and_signals(folder):
         assert f"/{arm}/errors_mm" in paths
     assert "/signals/q" not in paths
     assert any(path.startswith("/scene/patient") for path in paths)
+
+
+def _views(part):
+    """Every view of a layout."""
+    if isinstance(part, rrb.View):
+        return [part]
+    return [view for child in part.contents or () for view in _views(child)]
+
+
+def test_the_layout_has_plots_of_each_arm_and_shows_what_is_there(folder, trace):
+    held = {chunk.entity_path for chunk in RrdReader(folder / "recording.rrd").stream()}
+    shown = [
+        content.removeprefix("+ ").removesuffix("/**")
+        for view in _views(blueprint(scenario_of(trace), trace).root_container)
+        for content in ([view.contents] if isinstance(view.contents, str) else view.contents)
+        if content.startswith("+ /")
+    ]
+    for arm in ("left", "right"):
+        assert f"/{arm}/errors_mm" in shown
+        assert f"/{arm}/signals/tau" in shown
+    assert [path for path in shown if not any(entity.startswith(path) for entity in held)] == []
 
 
 def test_the_replayed_tips_are_where_the_trace_has_them(trace):
