@@ -139,7 +139,7 @@ class TeleoperationConfig(PartConfig):
         """Whether every ring is on its peg, or every goal was reached, passively and with rest at the end."""
         if self.program == "peg_and_ring":
             return conducted(rings_success(run), run)
-        return conducted(goals_success(run, len(self.goals)), run)
+        return conducted(goals_success(run, self.goals), run)
 
 
 class Teleoperation:

@@ -42,6 +42,7 @@ OPERATOR_COLUMNS = (
     scalar("goal"),
     scalar("goals_missed"),
     scalar("operator_done"),
+    scalar("handle_stop"),
 )
 
 
@@ -239,3 +240,4 @@ def fill_operator_columns(side: OperatorSide, out: Array) -> None:
         out[15 + i], out[18 + i] = handle.position[i], handle.velocity[i]
         out[21 + i], out[24 + i], out[27 + i] = side.wrench[i], hand.wrench[i], hand.intended[i]
     out[30], out[31], out[32], out[33] = hand.jaw, hand.goal, hand.missed, hand.done
+    out[34] = handle.stop
