@@ -48,6 +48,14 @@ SHIPPED: dict[str, str] = {
 }
 """The paper's experiment and what it claims, by name."""
 
+_ROW = (
+    "controller.resolver.passivity=true",
+    "controller.resolver.kinetic=false",
+    "controller.torque_law.energy_valve=false",
+    "controller.torque_law.press_max_n=null",
+)
+"""The paper's energy row in place of what the shipped scenarios have: `passive_convex`."""
+
 PASSIVITY: tuple[PassivityMode, ...] = ("tank", "tdpa", "off")
 GRIPS: tuple[Grip, ...] = ("normal", "light")
 DELAYS_MS = (0, 100, 200, 300, 500, 700, 1000)
@@ -115,6 +123,7 @@ class Push(SimulatedCase):
             seed=self.seed,
             assignments=[
                 "theatre=false",
+                *_ROW,
                 *_PUSH,
                 *_GRIP[self.grip],
                 f"task.passivity={self.passivity}",
@@ -154,8 +163,8 @@ class Shipped(SimulatedCase):
         return self.name
 
     def scenario(self) -> Scenario:
-        """The scenario; nothing but its theatre, which has no part in it, is left out."""
-        return load_scenario(SHIPPED[self.name], assignments=["theatre=false", *self.keys])
+        """The scenario; its theatre, which has no part in it, is left out, and the row is the paper's."""
+        return load_scenario(SHIPPED[self.name], assignments=["theatre=false", *_ROW, *self.keys])
 
     def measures(self, trace: Trace) -> Row:
         """Accuracy, tanks, slack, constraints."""
