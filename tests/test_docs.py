@@ -48,6 +48,7 @@ from surgsim.simulate.loop import simulate
 from surgsim.simulate.setup import prepare
 from surgsim.tasks import TASKS
 from surgsim.tasks.base import PathTaskConfig
+from surgsim.teleop.bilateral import BILATERAL
 from surgsim.trace.trace import base_blocks
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -163,7 +164,7 @@ def sections():
         "controller": ControllerConfig,
     }
     estimators = (PORT_ESTIMATORS, INSTRUMENT_ESTIMATORS)
-    for catalog in (TASKS, PLANTS, DISTURBANCES, PROPS, RESOLVERS, TORQUE_LAWS, *estimators):
+    for catalog in (TASKS, PLANTS, DISTURBANCES, PROPS, RESOLVERS, TORQUE_LAWS, BILATERAL, *estimators):
         for name in catalog.names():
             config = catalog.config(name)
             if config.__module__.startswith("surgsim."):

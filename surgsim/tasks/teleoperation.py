@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from functools import cached_property
-from typing import Literal, Self
+from typing import TYPE_CHECKING, Any, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,7 +10,7 @@ from pydantic import NonNegativeFloat, PositiveFloat, model_validator
 
 from surgsim.catalog import PartConfig, Surroundings
 from surgsim.columns import width
-from surgsim.compiled import as_parameter
+from surgsim.compiled import address_of, as_parameter
 from surgsim.models.config import Vec3
 from surgsim.models.peg_board import PegBoardLayout
 from surgsim.tasks.base import Feedback, TipCommand
@@ -24,14 +24,16 @@ from surgsim.tasks.teleoperation_program import (
     rings_success,
     way_points,
 )
+from surgsim.teleop.bilateral import BILATERAL
+from surgsim.teleop.bilateral.base import BilateralConfig, BilateralScheme, compiled_only, end_signature
+from surgsim.teleop.bilateral.passive_convex import PassiveConvexConfig
 from surgsim.teleop.channel import DRAW, Channel, ChannelConfig, draw_packets
 from surgsim.teleop.console import Console, ConsoleConfig
 from surgsim.teleop.mapping import MappingConfig, align
-from surgsim.teleop.messages import MODES, PassivityMode
+from surgsim.teleop.messages import MODES, SCHEME, TANK
 from surgsim.teleop.operator import Goal, Hand, OperatorConfig, describe_operator, fill_action, goal_rows
-from surgsim.teleop.passivity_control import PassivityControlConfig
 from surgsim.teleop.receiver import ReceiverConfig, expect
-from surgsim.teleop.tank import TankConfig, fill_tank
+from surgsim.teleop.tank import fill_tank
 from surgsim.teleop.teleoperator import (
     COLUMNS,
     DRAWN,
@@ -51,6 +53,11 @@ from surgsim.tick.status import GOES_ON
 Array = NDArray[np.float64]
 _MOST_PERIODS = 4_000_000
 
+if TYPE_CHECKING:
+    AnyBilateral = BilateralConfig
+else:
+    AnyBilateral = BILATERAL.union()
+
 
 class TeleoperationConfig(PartConfig):
     """Teleoperation through a delayed channel, by a simulated operator at a master console.
@@ -63,19 +70,13 @@ class TeleoperationConfig(PartConfig):
         goal_timeout_s: After this the operator gives up a goal of `peg_and_ring` [s].
         duration_s: Longest time that it may take [s].
         hold_end_s: Time at rest after the last goal [s].
-        passivity: Energy tanks, the time-domain passivity controller, or nothing.
-        stiffness_n_per_m: K_v of the force law, per metre of handle motion [N/m].
-        refill_damping_ns_per_mj: Damper on the handle per joule that its tank lacks; 0: none.
-        drift_gain_per_s: Pull of the tip to the master's position beside its velocity; 0: none [1/s].
-        drift_speed_m_per_s: Limit of that pull [m/s].
+        bilateral: What either side sends, what the hand feels and where the tip is led: a bilateral scheme.
         operator: Eyes, decisions and hand.
         console: The master console.
         mapping: Motion scaling and rotation between console and world.
         channel: The channel to the remote side, and the one back unless `channel_back` is given.
         channel_back: The channel back; null: as `channel`.
         receiver: How long a set point is believed, on both sides.
-        tanks: The energy tank of each side.
-        passivity_control: The passivity controller of each side.
     """
 
     type: Literal["teleoperation"] = "teleoperation"
@@ -86,19 +87,13 @@ class TeleoperationConfig(PartConfig):
     goal_timeout_s: PositiveFloat = 20.0
     duration_s: PositiveFloat = 60.0
     hold_end_s: NonNegativeFloat = 1.0
-    passivity: PassivityMode = "tank"
-    stiffness_n_per_m: NonNegativeFloat = 60.0
-    refill_damping_ns_per_mj: NonNegativeFloat = 20.0
-    drift_gain_per_s: NonNegativeFloat = 2.0
-    drift_speed_m_per_s: PositiveFloat = 0.02
+    bilateral: AnyBilateral = PassiveConvexConfig()
     operator: OperatorConfig = OperatorConfig()
     console: ConsoleConfig = ConsoleConfig()
     mapping: MappingConfig = MappingConfig()
     channel: ChannelConfig = ChannelConfig()
     channel_back: ChannelConfig | None = None
     receiver: ReceiverConfig = ReceiverConfig()
-    tanks: TankConfig = TankConfig()
-    passivity_control: PassivityControlConfig = PassivityControlConfig()
 
     @model_validator(mode="after")
     def _one_program(self) -> Self:
@@ -165,8 +160,13 @@ class Teleoperation:
         self._console = Console(config.console, period_s)
         most = min(config.duration_s / period_s, _MOST_PERIODS)
         lives = [channel.life(period_s, round(most)) for channel in self._channels]
-        self._places = places(*lives, *map(copies, self._channels))
-        self.gains = np.concatenate([np.zeros(LAW_SIZE), goal_rows(self._goals).ravel()])
+        round_trip = sum(channel.delay_s for channel in self._channels)
+        self._scheme = config.bilateral.build(period_s, round_trip)
+        ends = self._scheme.memory_size if self._scheme else 0
+        forth, back = map(copies, self._channels)
+        self._places = places(lives[0], lives[1], forth, back, ends)
+        own = self._scheme.gains if self._scheme else np.zeros(0)
+        self.gains = np.concatenate([np.zeros(LAW_SIZE), goal_rows(self._goals).ravel(), own])
         self.memory = np.zeros(self._places.end)
         self._describe(lives)
         self.reset()
@@ -194,12 +194,14 @@ class Teleoperation:
         near, far = law.operator, law.remote
         law.hold_end_s, law.start[:], law.force_share = c.hold_end_s, self._start, 1.0
         for side in (near, far):
-            take(side, c)
-            side.passivity, side.period_s = MODES[c.passivity], self._period
+            side.period_s = self._period
             take(side.receiver, c.receiver)
-            take(side.tank, c.tanks)
-            take(side.control, c.passivity_control)
-            side.control.coordinates = c.passivity_control.port_force == "coordinating"
+            _describe_law(side, c.bilateral, self._scheme)
+        if self._scheme:
+            begin = self.gains.size - self._scheme.gains.size
+            for side, memory in ((near, at.operator_end), (far, at.remote_end)):
+                side.scheme.gains, side.scheme.gain_count = begin, self._scheme.gains.size
+                side.scheme.memory, side.scheme.memory_size = memory, self._scheme.memory_size
         near.start_tip[:] = self._start
         self._console.describe(near.console)
         round_trip = sum(channel.delay_s for channel in self._channels)
@@ -228,9 +230,11 @@ class Teleoperation:
         align(law.operator.operator.mapping, c.mapping, near.console.state.position, self._start)
         state.ends = bool(self._goals) or self._hand is not None
         near.in_python = self._hand is not None
+        near.of_scheme = far.of_scheme = self._scheme is not None
         near.scale = 1.0
         for side_law, side in ((law.operator, near), (law.remote, far)):
-            fill_tank(side_law.tank, side.tank)
+            if side_law.passivity == TANK:
+                fill_tank(side_law.tank, side.tank)
             expect(side_law.receiver, side.receiver, memory)
         state.work.p[:] = far.reference[:] = self._start
         state.forth.drawn = state.back.drawn = near.operator.shaken = near.operator.scattered = DRAWN
@@ -316,6 +320,20 @@ class Teleoperation:
         """Whether the operator has been done for `hold_end_s`; a simulated one without goals holds on."""
         law, state = laid_over(Law, self.gains), laid_over(State, self.memory)
         return bool(state.ends and state.is_done and t_s >= state.done_s + law.hold_end_s)
+
+
+def _describe_law(side: Any, bilateral: Any, scheme: BilateralScheme | None) -> None:
+    """Fill the law of a side: its own, or where the kernels of a scheme are."""
+    if scheme is None:
+        take(side, bilateral)
+        side.passivity = MODES[bilateral.passivity]
+        take(side.tank, bilateral.tanks)
+        take(side.control, bilateral.passivity_control)
+        side.control.coordinates = bilateral.passivity_control.port_force == "coordinating"
+        return
+    side.passivity = SCHEME
+    for name in ("feel", "tell", "follow"):
+        side.scheme[name] = address_of(compiled_only(getattr(scheme, name), name), end_signature())
 
 
 _Draw = Callable[[Array], None]

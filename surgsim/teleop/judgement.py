@@ -38,13 +38,11 @@ class Columns(Protocol):
 
 
 def excess_j(run: Columns) -> float:
-    """Largest energy that hand and surroundings got, less what the tanks held at first [J].
+    """Largest energy that hand and surroundings got, less what tanks and channels held at first [J].
 
-    A passive teleoperator keeps it at or below 0. Without tanks nothing is stored.
+    A passive teleoperator keeps it at or below 0. Without tanks nothing is stored, and their columns are 0.
     """
-    stored = 0.0
-    if np.isfinite(run["tank_account_residual_j"]).all():
-        stored = float(run["tank_operator_j"][0] + run["tank_remote_j"][0])
+    stored = float(run["tank_operator_j"][0] + run["tank_remote_j"][0] + run["in_flight_j"][0])
     return float(np.nanmax(run["delivered_j"])) - stored
 
 

@@ -13,7 +13,8 @@ from surgsim.columns import scalar, vector, width
 from surgsim.compiled import compiled
 from surgsim.teleop.account import ACCOUNT_COLUMNS, fill_account
 from surgsim.teleop.channel import DRAW, PACKET, Channel, ChannelConfig, ChannelLaw, send
-from surgsim.teleop.messages import CONTENT, FORCE, POSITION, TANK, VELOCITY
+from surgsim.teleop.mapping import motion_to_remote
+from surgsim.teleop.messages import CONTENT, FORCE, POSITION, SCHEME, TANK
 from surgsim.teleop.operator_side import (
     OPERATOR_COLUMNS,
     OperatorSide,
@@ -79,7 +80,7 @@ class State(Record):
         is_done: Whether the operator is done.
         done_s: Since when [s].
         velocity: v_d of the last period (3,) [m/s].
-        content: The message of the remote side, seven numbers.
+        content: The message of the remote side, ten numbers.
         operator: The operator's side.
         remote: The remote side.
         forth: The channel to the remote side.
@@ -116,6 +117,8 @@ class Places(NamedTuple):
         back_taken: That the operator's side took.
         forth_ring: Packets under way to the remote side.
         back_ring: From it.
+        operator_end: Memory of the bilateral scheme at the operator's end.
+        remote_end: At the remote one.
         end: Length of the memory.
     """
 
@@ -127,15 +130,18 @@ class Places(NamedTuple):
     back_taken: int
     forth_ring: int
     back_ring: int
+    operator_end: int
+    remote_end: int
     end: int
 
 
-def places(forth: int, back: int, forth_copies: int, back_copies: int) -> Places:
-    """Places for channels in which a packet lives for so many periods, in so many copies."""
+def places(forth: int, back: int, forth_copies: int, back_copies: int, scheme: int = 0) -> Places:
+    """Places for channels whose packets live for so many periods, in so many copies, and for a scheme."""
     sizes = (
         *(DRAW * DRAWN, DRAW * DRAWN, 3 * DRAWN, 3 * DRAWN),
         *(forth, back),
         *(PACKET * forth * forth_copies, PACKET * back * back_copies),
+        *(scheme, scheme),
     )
     begins = [STATE_SIZE]
     for size in sizes:
@@ -167,9 +173,13 @@ def teleoperate(gains: Array, feedback: Feedback, memory: Array, out: Command) -
     p, force = state.content[POSITION : POSITION + 3], state.content[FORCE : FORCE + 3]
     for i in range(3):
         p[i], force[i] = feedback.p_WT[i], -feedback.f_T[i]
-    energy = step_remote_side(
-        law.remote, remote, law.forth, state.forth, memory, t_s, p, feedback.v_WT, force, work
+    status, energy = step_remote_side(
+        law.remote, gains, remote, law.forth, state.forth, memory, t_s, p, feedback.v_WT, force, work
     )
+    if status != GOES_ON:
+        return status
+    if law.remote.passivity == SCHEME:
+        state.content[:] = remote.end.content
     send(law.back, state.back, memory, t_s, state.content, energy)
     if operator.hand.done and not state.is_done:
         state.is_done, state.done_s = 1, t_s
@@ -201,6 +211,6 @@ def _record(law: Law, state: State, t_s: float, values: Array) -> None:
     fill_operator_columns(operator, values)
     fill_remote_columns(remote, values[_REMOTE:])
     fill_account(law.operator, operator, law.remote, remote, state.forth, state.back, values[_ACCOUNT:])
-    for i in range(3):
-        values[_ISSUED + i] = operator.content[VELOCITY + i]
+    velocity = operator.console.state.velocity
+    motion_to_remote(law.operator.operator.mapping, velocity, values[_ISSUED : _ISSUED + 3])
     values[_AGE] = t_s - remote.receiver.sent_s if remote.receiver.highest >= 0 else math.nan

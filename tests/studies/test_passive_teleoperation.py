@@ -264,7 +264,7 @@ def test_a_push_is_what_it_says():
     push = Push(place="wall", passivity="tdpa", grip="light", delay_ms=700, link="lossy", seed=3)
     scenario = push.scenario()
     task = scenario.task
-    assert (scenario.seed, task.passivity, len(scenario.props)) == (3, "tdpa", 1)
+    assert (scenario.seed, task.bilateral.passivity, len(scenario.props)) == (3, "tdpa", 1)
     assert (task.operator.expected_delay_s, task.operator.stiffness_n_per_m) == (0.7, 20.0)
     assert (task.channel.delay_s, task.channel.jitter_s, task.channel.loss) == (0.35, 0.01, 0.1)
     assert Push(place="free", passivity="off", grip="normal", delay_ms=0).scenario().props == ()

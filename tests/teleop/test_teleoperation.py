@@ -80,7 +80,7 @@ def test_the_passivity_controller_rests_on_a_wall_and_gives_no_energy(grip):
         for key, value in zip(("stiffness_n_per_m", "damping_ns_per_m"), grip, strict=True)
     )
     goals = "[{position_m: [0.0, 0.65, -0.075], push: true, dwell_s: 2.0}, {position_m: [0.0, 0.65, -0.04]}]"
-    assignments = (f"task.goals={goals}", "task.passivity=tdpa", stiffness, damping)
+    assignments = (f"task.goals={goals}", "task.bilateral.passivity=tdpa", stiffness, damping)
     scenario = load_scenario("teleop_wall_panda", controller="passive_convex", assignments=assignments)
     run = Simulation(prepare(scenario)).run()
     force = run["tip_force_z_n"][run["goal"] == 0][-700:]
@@ -180,7 +180,7 @@ DISTURBED = ("disturbances=[{type: sensor_noise}, {type: actuation_delay, delay_
 def test_a_small_tank_covers_a_fast_impact_with_the_valve_and_not_without(controller, disturbed):
     assignments = (
         *disturbed,
-        "task.tanks={initial_j: 0.012, target_j: 0.012}",
+        "task.bilateral.tanks={initial_j: 0.012, target_j: 0.012}",
         "task.goals=[{position_m: [0.0, 0.65, -0.12], push: true, dwell_s: 0.5}]",
         "task.operator={stiffness_n_per_m: 1000.0, damping_ns_per_m: 20.0, reach: "
         "{speed_limit_m_per_s: 0.5, fitts_a_s: 0.0, fitts_b_s: 0.01, shortest_s: 0.1}}",

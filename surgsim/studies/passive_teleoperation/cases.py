@@ -126,7 +126,7 @@ class Push(SimulatedCase):
                 *_ROW,
                 *_PUSH,
                 *_GRIP[self.grip],
-                f"task.passivity={self.passivity}",
+                f"task.bilateral.passivity={self.passivity}",
                 f"task.duration_s={self.duration_s}",
                 f"task.operator.expected_delay_s={delay_s}",
                 f"task.channel={{delay_s: {delay_s / 2.0}, {_LINK[self.link]}}}",
