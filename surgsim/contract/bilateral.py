@@ -26,7 +26,9 @@ def _rows(scheme: BilateralScheme, motion: float) -> Array:
     """Answers of both ends (ticks, 9) while the handle is led to and fro by `motion` [m]; the tip obeys."""
     near, far = new(End, 0), new(End, 0)
     memories = [np.zeros(scheme.memory_size) for _ in range(2)]
-    forth, back, rows = [], [], []
+    forth: list[tuple[Array, float]] = []
+    back: list[tuple[Array, float]] = []
+    rows = []
     for end in (near, far):
         end.period_s, end.trust = DT, 1.0
     near.mobility_per_kg = 1.0

@@ -93,14 +93,25 @@ def _document(source: Source | Scenario, seed: int | None) -> YamlDocument:
 
 
 def _beside_it(document: YamlDocument) -> YamlDocument:
-    """`document` with the paths of the files of arm and instrument from the scenario's own folder on."""
+    """`document` with paths of files of arm, instrument and channels from the scenario's own folder on."""
     folder, tree = Path(document.source).parent.absolute(), dict(document.tree)
     for part in ("robot", "instrument"):
         given = tree.get(part)
         if isinstance(given, dict):
             whole = {key: str(folder / given[key]) for key in KINDS if isinstance(given.get(key), str)}
             tree[part] = {**given, **whole}
+    if isinstance(tree.get("task"), dict):
+        tree["task"] = _traced(tree["task"], folder)
     return replace(document, tree=tree)
+
+
+def _traced(task: dict[str, Any], folder: Path) -> dict[str, Any]:
+    """`task` with the paths of the traces of its channels from `folder` on."""
+    found = dict(task)
+    for key, channel in task.items():
+        if isinstance(channel, dict) and isinstance(channel.get("trace"), str):
+            found[key] = {**channel, "trace": str(folder / channel["trace"])}
+    return found
 
 
 def _instead(document: YamlDocument, controller: Source | ControllerConfig) -> YamlDocument:

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Literal, Self
+from typing import TYPE_CHECKING, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,7 +10,7 @@ from pydantic import NonNegativeFloat, PositiveFloat, model_validator
 
 from surgsim.catalog import PartConfig, Surroundings
 from surgsim.columns import width
-from surgsim.compiled import address_of, as_parameter
+from surgsim.compiled import as_parameter
 from surgsim.models.config import Vec3
 from surgsim.models.peg_board import PegBoardLayout
 from surgsim.tasks.base import Feedback, TipCommand
@@ -25,12 +25,13 @@ from surgsim.tasks.teleoperation_program import (
     way_points,
 )
 from surgsim.teleop.bilateral import BILATERAL
-from surgsim.teleop.bilateral.base import BilateralConfig, BilateralScheme, compiled_only, end_signature
+from surgsim.teleop.bilateral.base import BilateralConfig
+from surgsim.teleop.bilateral.ends import describe_law
 from surgsim.teleop.bilateral.passive_convex import PassiveConvexConfig
 from surgsim.teleop.channel import DRAW, Channel, ChannelConfig, draw_packets
 from surgsim.teleop.console import Console, ConsoleConfig
 from surgsim.teleop.mapping import MappingConfig, align
-from surgsim.teleop.messages import MODES, SCHEME, TANK
+from surgsim.teleop.messages import TANK
 from surgsim.teleop.operator import Goal, Hand, OperatorConfig, describe_operator, fill_action, goal_rows
 from surgsim.teleop.receiver import ReceiverConfig, expect
 from surgsim.teleop.tank import fill_tank
@@ -76,6 +77,8 @@ class TeleoperationConfig(PartConfig):
         mapping: Motion scaling and rotation between console and world.
         channel: The channel to the remote side, and the one back unless `channel_back` is given.
         channel_back: The channel back; null: as `channel`.
+        video: The channel of the picture that the operator sees; null: it comes with the tip's state, by the
+            channel back.
         receiver: How long a set point is believed, on both sides.
     """
 
@@ -93,6 +96,7 @@ class TeleoperationConfig(PartConfig):
     mapping: MappingConfig = MappingConfig()
     channel: ChannelConfig = ChannelConfig()
     channel_back: ChannelConfig | None = None
+    video: ChannelConfig | None = None
     receiver: ReceiverConfig = ReceiverConfig()
 
     @model_validator(mode="after")
@@ -155,16 +159,17 @@ class Teleoperation:
     ) -> None:
         self._c, self._start, self._period, self._seed = config, start, period_s, seed
         self._goals = config.program_goals()
-        self._channels = config.channel, config.channel_back or config.channel
+        self._channels = [config.channel, config.channel_back or config.channel]
+        round_trip = sum(channel.delay_s for channel in self._channels)
+        self._channels += [config.video] if config.video else []
         self._hand: Hand | None = None
         self._console = Console(config.console, period_s)
         most = min(config.duration_s / period_s, _MOST_PERIODS)
         lives = [channel.life(period_s, round(most)) for channel in self._channels]
-        round_trip = sum(channel.delay_s for channel in self._channels)
         self._scheme = config.bilateral.build(period_s, round_trip)
         ends = self._scheme.memory_size if self._scheme else 0
-        forth, back = map(copies, self._channels)
-        self._places = places(lives[0], lives[1], forth, back, ends)
+        packets = [(life, copies(channel)) for life, channel in zip(lives, self._channels, strict=True)]
+        self._places = places(packets, ends)
         own = self._scheme.gains if self._scheme else np.zeros(0)
         self.gains = np.concatenate([np.zeros(LAW_SIZE), goal_rows(self._goals).ravel(), own])
         self.memory = np.zeros(self._places.end)
@@ -196,7 +201,7 @@ class Teleoperation:
         for side in (near, far):
             side.period_s = self._period
             take(side.receiver, c.receiver)
-            _describe_law(side, c.bilateral, self._scheme)
+            describe_law(side, c.bilateral, self._scheme)
         if self._scheme:
             begin = self.gains.size - self._scheme.gains.size
             for side, memory in ((near, at.operator_end), (far, at.remote_end)):
@@ -204,18 +209,23 @@ class Teleoperation:
                 side.scheme.memory, side.scheme.memory_size = memory, self._scheme.memory_size
         near.start_tip[:] = self._start
         self._console.describe(near.console)
-        round_trip = sum(channel.delay_s for channel in self._channels)
+        forth, back = self._channels[:2]
+        round_trip = forth.delay_s + (c.video or back).delay_s  # of what the eyes see
         self._noise_m = describe_operator(near.operator, c.operator, self._period, round_trip)
         near.operator.goals, near.operator.goal_count = LAW_SIZE, len(self._goals)
         near.operator.tremor, near.operator.scatter = at.tremor, at.scatter
         lines = (
             (law.forth, far.receiver, at.forth_draws, at.forth_ring, at.forth_taken),
             (law.back, near.receiver, at.back_draws, at.back_ring, at.back_taken),
+            (law.video, near.screen, at.video_draws, at.video_ring, at.video_taken),
         )
+        law.has_video = near.has_video = c.video is not None
+        take(near.screen, c.receiver)
         for (line, receiver, draws, ring, taken), config, life in zip(
-            lines, self._channels, lives, strict=True
+            lines, self._channels, lives, strict=False
         ):
-            line.delay_s, line.draws, line.ring = config.delay_s, draws, ring
+            line.delay_s, line.draws, line.ring = config.bounds()[0], draws, ring
+            line.clock_rate, line.clock_skew_s = 1.0 + 1e-6 * config.clock_drift_ppm, config.clock_skew_s
             line.capacity = life * copies(config)
             line.cumulative = receiver.cumulative = config.energy == "cumulative"
             receiver.taken, receiver.window = taken, life
@@ -236,22 +246,34 @@ class Teleoperation:
             if side_law.passivity == TANK:
                 fill_tank(side_law.tank, side.tank)
             expect(side_law.receiver, side.receiver, memory)
+        if c.video is not None:
+            expect(law.operator.screen, near.screen, memory)
         state.work.p[:] = far.reference[:] = self._start
-        state.forth.drawn = state.back.drawn = near.operator.shaken = near.operator.scattered = DRAWN
+        state.forth.drawn = state.back.drawn = state.video.drawn = DRAWN
+        near.operator.shaken = near.operator.scattered = DRAWN
         self._random = [np.random.default_rng(_child(self._seed, *key)) for key in _STREAMS]
         self.refill(1)
 
     def refill(self, ticks: int) -> None:
         """Draw ahead what the next `ticks` periods may need, at most `DRAWN`."""
         state, at = laid_over(State, self.memory), self._places
-        tremor, scatter, forth, back = self._random
+        tremor, scatter, *of_channels = self._random
         operator = state.operator.operator
-        used = (state.forth.drawn, state.back.drawn, operator.shaken, operator.scattered)
+        lines = list(
+            zip(
+                (state.forth, state.back, state.video),
+                self._channels,
+                of_channels,
+                (at.forth_draws, at.back_draws, at.video_draws),
+                strict=False,
+            )
+        )
+        used = (*(line[0].drawn for line in lines), operator.shaken, operator.scattered)
         if DRAWN - max(used) >= ticks:
             return
 
         def packets(channel: Channel, config: ChannelConfig, random: np.random.Generator) -> _Draw:
-            return lambda rows: draw_packets(config, channel, random, rows)
+            return lambda rows: draw_packets(config, channel, random, rows, self._period)
 
         def shakes(rows: Array) -> None:
             rows[:] = self._noise_m * tremor.standard_normal(rows.shape)
@@ -268,10 +290,7 @@ class Teleoperation:
             draw(rows[left:])
             return 0
 
-        for channel, config, random, begin in (
-            (state.forth, self._channels[0], forth, at.forth_draws),
-            (state.back, self._channels[1], back, at.back_draws),
-        ):
+        for channel, config, random, begin in lines:
             channel.drawn = top_up(begin, DRAW, int(channel.drawn), packets(channel, config, random))
         operator.shaken = top_up(at.tremor, 3, int(operator.shaken), shakes)
         operator.scattered = top_up(at.scatter, 3, int(operator.scattered), misses)
@@ -280,8 +299,14 @@ class Teleoperation:
         """Let the hand in Python act, in the midst of a period."""
         assert self._hand is not None
         side = laid_over(State, self.memory).operator
-        command = self._hand.step(float(side.t_s), side.tip.copy(), side.console.state.copy())
+        command = self._hand.step(float(side.t_s), side.seen.copy(), side.console.state.copy())
         fill_action(side.hand, command)
+
+    @property
+    def picture_tick(self) -> int:
+        """Tick whose picture is on the operator's screen: that of the newest packet; -1 before the first."""
+        side = laid_over(State, self.memory).operator
+        return int((side.screen if self._c.video else side.receiver).highest)
 
     def enter(self, entry: Array) -> None:
         """Let the kernel call the C function that enters `act` (1,), see `surgsim.tick.python_part`."""
@@ -322,23 +347,9 @@ class Teleoperation:
         return bool(state.ends and state.is_done and t_s >= state.done_s + law.hold_end_s)
 
 
-def _describe_law(side: Any, bilateral: Any, scheme: BilateralScheme | None) -> None:
-    """Fill the law of a side: its own, or where the kernels of a scheme are."""
-    if scheme is None:
-        take(side, bilateral)
-        side.passivity = MODES[bilateral.passivity]
-        take(side.tank, bilateral.tanks)
-        take(side.control, bilateral.passivity_control)
-        side.control.coordinates = bilateral.passivity_control.port_force == "coordinating"
-        return
-    side.passivity = SCHEME
-    for name in ("feel", "tell", "follow"):
-        side.scheme[name] = address_of(compiled_only(getattr(scheme, name), name), end_signature())
-
-
 _Draw = Callable[[Array], None]
-_STREAMS = ((0, 0), (0, 1), (1,), (2,))
-"""Children of the seed: tremor, scatter, packets to the remote side and back."""
+_STREAMS = ((0, 0), (0, 1), (1,), (2,), (3,))
+"""Children of the seed: tremor, scatter, packets to the remote side, back, and of the picture."""
 
 
 def _child(seed: np.random.SeedSequence, *key: int) -> np.random.SeedSequence:

@@ -67,6 +67,8 @@ class OperatorSideLaw(Record):
         console: The console.
         operator: The simulated operator, and the mapping between console and world.
         receiver: Of what comes from the remote side.
+        has_video: Whether the picture has a channel of its own.
+        screen: The receiver of the picture.
         tank: The energy tank.
         control: The passivity controller.
         scheme: The bilateral scheme.
@@ -82,6 +84,8 @@ class OperatorSideLaw(Record):
     console: ConsoleLaw
     operator: OperatorLaw
     receiver: ReceiverLaw
+    has_video: int
+    screen: ReceiverLaw
     tank: TankLaw
     control: PassivityLaw
     scheme: CalledScheme
@@ -96,6 +100,7 @@ class OperatorSide(Record):
         t_s: Time [s].
         scale: Share of the force that the tank can pay for.
         tip: The tip as it is known (3,) [m].
+        seen: The tip as the screen shows it (3,) [m].
         wrench: What the motors are to render, force and zeros (6,) [N, N m].
         desired: Force before the tank or the passivity controller (3,) [N].
         path: Motion of the handle over the period (3,) [m].
@@ -104,6 +109,7 @@ class OperatorSide(Record):
         hand: What the hand does.
         operator: The simulated operator.
         receiver: Of what comes from the remote side.
+        screen: Of the picture.
         tank: The energy tank.
         port: The passivity observer.
         end: What a bilateral scheme sees and answers.
@@ -112,13 +118,14 @@ class OperatorSide(Record):
     SHAPES: ClassVar[dict[str, str]] = {
         "wrench": "6",
         "content": str(CONTENT),
-        **{name: "3" for name in ("tip", "desired", "path")},
+        **{name: "3" for name in ("tip", "seen", "desired", "path")},
     }
     in_python: int
     of_scheme: int
     t_s: float
     scale: float
     tip: Array
+    seen: Array
     wrench: Array
     desired: Array
     path: Array
@@ -127,9 +134,19 @@ class OperatorSide(Record):
     hand: HandAction
     operator: Operator
     receiver: Receiver
+    screen: Receiver
     tank: Tank
     port: PortEnergy
     end: End
+
+
+@compiled
+def look(law: OperatorSideLaw, side: OperatorSide, line: ChannelLaw, channel: Channel, memory: Array) -> None:
+    """Show the newest picture that has come by a channel of its own."""
+    receive(law.screen, side.screen, line, channel, memory, side.t_s)
+    known = side.screen.highest >= 0
+    for i in range(3):
+        side.seen[i] = side.screen.content[POSITION + i] if known else law.start_tip[i]
 
 
 @compiled
@@ -143,6 +160,8 @@ def receive_at_operator(
     known = side.receiver.highest >= 0
     for i in range(3):
         side.tip[i] = side.receiver.content[POSITION + i] if known else law.start_tip[i]
+        if not law.has_video:
+            side.seen[i] = side.tip[i]
     handle = side.console.state
     feedback_force(law.operator.mapping, handle.position, side.tip, law.stiffness_n_per_m, side.desired)
     renderable(law.console, side.console, side.desired)
@@ -269,7 +288,9 @@ def step_operator_side(
     if side.in_python:
         status = enter(law.entry)
     else:
-        operate(law.operator, gains, side.operator, memory, side.t_s, side.tip, side.console.state, side.hand)
+        operate(
+            law.operator, gains, side.operator, memory, side.t_s, side.seen, side.console.state, side.hand
+        )
     if status != GOES_ON:
         return status, 0.0
     rendered = _move_console(law, side)

@@ -1,11 +1,13 @@
 """How the two sides call a bilateral scheme: by the addresses of its kernels."""
 
-from typing import ClassVar
+from typing import Any, ClassVar
 
-from surgsim.compiled import call_at, compiled
-from surgsim.teleop.bilateral.base import End
+from surgsim.compiled import address_of, call_at, compiled
+from surgsim.teleop.bilateral.base import BilateralScheme, End, compiled_only, end_signature
+from surgsim.teleop.messages import MODES, SCHEME
 from surgsim.teleop.receiver import Receiver, ReceiverLaw, trust
 from surgsim.tick.arrays import Array, Record
+from surgsim.tick.overlay import take
 
 
 class CalledScheme(Record):
@@ -70,3 +72,17 @@ def follow(called: CalledScheme, gains: Array, end: End, memory: Array) -> int:
         called.follow, numbers, end, memory[called.memory : called.memory + called.memory_size]
     )
     return status
+
+
+def describe_law(side: Any, bilateral: Any, scheme: BilateralScheme | None) -> None:
+    """Fill the law of a side: its own, or where the kernels of a scheme are."""
+    if scheme is None:
+        take(side, bilateral)
+        side.passivity = MODES[bilateral.passivity]
+        take(side.tank, bilateral.tanks)
+        take(side.control, bilateral.passivity_control)
+        side.control.coordinates = bilateral.passivity_control.port_force == "coordinating"
+        return
+    side.passivity = SCHEME
+    for name in ("feel", "tell", "follow"):
+        side.scheme[name] = address_of(compiled_only(getattr(scheme, name), name), end_signature())
