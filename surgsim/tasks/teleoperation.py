@@ -257,20 +257,19 @@ class Teleoperation:
     def refill(self, ticks: int) -> None:
         """Draw ahead what the next `ticks` periods may need, at most `DRAWN`."""
         state, at = laid_over(State, self.memory), self._places
-        tremor, scatter, *of_channels = self._random
         operator = state.operator.operator
-        lines = list(
-            zip(
-                (state.forth, state.back, state.video),
-                self._channels,
-                of_channels,
-                (at.forth_draws, at.back_draws, at.video_draws),
-                strict=False,
-            )
-        )
-        used = (*(line[0].drawn for line in lines), operator.shaken, operator.scattered)
+        used = [state.forth.drawn, state.back.drawn, operator.shaken, operator.scattered]
+        used += [state.video.drawn] if self._c.video else []
         if DRAWN - max(used) >= ticks:
             return
+        tremor, scatter, *of_channels = self._random
+        lines = zip(
+            (state.forth, state.back, state.video),
+            self._channels,
+            of_channels,
+            (at.forth_draws, at.back_draws, at.video_draws),
+            strict=False,
+        )
 
         def packets(channel: Channel, config: ChannelConfig, random: np.random.Generator) -> _Draw:
             return lambda rows: draw_packets(config, channel, random, rows, self._period)
