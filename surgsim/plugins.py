@@ -17,6 +17,7 @@ GROUPS = (
     "surgsim.disturbances",
     "surgsim.props",
     "surgsim.plants",
+    "surgsim.bilateral",
     "surgsim.policies",
     "surgsim.robots",
     "surgsim.metrics",

@@ -49,6 +49,7 @@ from surgsim.scenario.yaml_text import parse_yaml
 from surgsim.simulate.loop import prepared, simulate
 from surgsim.tasks import TASKS
 from surgsim.tasks.base import PathTaskConfig
+from surgsim.teleop.bilateral import BILATERAL
 from surgsim.trace.trace import base_blocks
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -167,7 +168,7 @@ def sections():
         "controller": ControllerConfig,
     }
     estimators = (PORT_ESTIMATORS, INSTRUMENT_ESTIMATORS)
-    for catalog in (TASKS, PLANTS, DISTURBANCES, PROPS, RESOLVERS, TORQUE_LAWS, *estimators):
+    for catalog in (TASKS, PLANTS, DISTURBANCES, PROPS, RESOLVERS, TORQUE_LAWS, BILATERAL, *estimators):
         for name in catalog.names():
             config = catalog.config(name)
             if config.__module__.startswith("surgsim."):

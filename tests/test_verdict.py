@@ -19,6 +19,7 @@ from surgsim.verdict import Held, judge, unfinished
 
 DONE = Ending(outcome=Outcome.COMPLETED, t_s=1.0)
 GOALS = "[{position_m: [0, 0.65, -0.03]}, {position_m: [0.01, 0.65, -0.03]}]"
+STILL = "the operator was still at goal 2 of 2 when time was up"
 TELEOPERATED = (scalar("goal"), scalar("goals_missed"), scalar("operator_done"))
 
 
@@ -117,8 +118,8 @@ def test_rings_beside_their_pegs_are_no_success(states, done, reason):
     [
         (2, 0, 1, True, "2 of 2 goals were reached"),
         (2, 1, 1, False, "1 of 2 goals were reached"),
-        (1, 0, 0, False, "the operator was still at goal 2 of 2 when time was up"),
-        (1, 1, 0, False, "the operator was still at goal 2 of 2 when time was up, 1 missed"),
+        (1, 0, 0, False, f"{STILL}: the tip is 651 mm from it"),
+        (1, 1, 0, False, f"{STILL}, 1 missed: the tip is 651 mm from it"),
         (0, 0, 1, None, "a person operated, whose goals nobody counts"),
     ],
 )

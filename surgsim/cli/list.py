@@ -23,6 +23,7 @@ KINDS = (
     "policies",
     "externals",
     "plants",
+    "bilateral",
     "disturbances",
     "props",
     "metrics",
@@ -86,6 +87,7 @@ def items_of(kind: str) -> list[tuple[str, str]]:
     from surgsim.plant.disturbances import DISTURBANCES
     from surgsim.plant.props import PROPS
     from surgsim.tasks import TASKS
+    from surgsim.teleop.bilateral import BILATERAL
 
     catalogs = {
         "tasks": TASKS,
@@ -94,6 +96,7 @@ def items_of(kind: str) -> list[tuple[str, str]]:
         "port-estimators": PORT_ESTIMATORS,
         "instrument-estimators": INSTRUMENT_ESTIMATORS,
         "plants": PLANTS,
+        "bilateral": BILATERAL,
         "disturbances": DISTURBANCES,
         "props": PROPS,
     }

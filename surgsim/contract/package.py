@@ -5,6 +5,7 @@ from typing import Any
 
 from surgsim.catalog import Catalog
 from surgsim.contract import (
+    bilateral,
     configs,
     instrument_estimators,
     metrics,
@@ -34,6 +35,7 @@ from surgsim.plant.disturbances import DISTURBANCES
 from surgsim.plant.props import PROPS
 from surgsim.plugins import GROUPS, Offer, all_offers, misplaced
 from surgsim.tasks import TASKS
+from surgsim.teleop.bilateral import BILATERAL
 
 CATALOGS = (
     RESOLVERS,
@@ -44,6 +46,7 @@ CATALOGS = (
     DISTURBANCES,
     PROPS,
     PLANTS,
+    BILATERAL,
 )
 CHECKS: dict[str, tuple[Check, ...]] = {
     RESOLVERS.kind: resolvers.CHECKS,
@@ -54,6 +57,7 @@ CHECKS: dict[str, tuple[Check, ...]] = {
     DISTURBANCES.kind: plant_parts.DISTURBANCE_CHECKS,
     PROPS.kind: plant_parts.PROP_CHECKS,
     PLANTS.kind: plant_parts.PLANT_CHECKS,
+    BILATERAL.kind: bilateral.CHECKS,
 }
 _BY_GROUP = {catalog.group: catalog for catalog in CATALOGS}
 _OTHER_KINDS = {POLICIES: "policy", METRICS: "metric", ROBOTS: "robot"}

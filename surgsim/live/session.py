@@ -1,6 +1,7 @@
 """The simulation at the pace of the wall clock, with a person in the loop."""
 
 import signal
+from collections import deque
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Protocol
@@ -14,6 +15,7 @@ from surgsim.live.status import Status, status
 from surgsim.plant.truth import Truth
 from surgsim.simulate.loop import Simulation
 from surgsim.simulate.setup import Setup
+from surgsim.tasks.teleoperation import Teleoperation
 from surgsim.trace.trace import Trace
 
 Array = NDArray[np.float64]
@@ -40,13 +42,18 @@ class Screen(Protocol):
 def drive(
     setup: Setup, simulation: Simulation, controls: Controls, screen: Screen, pace: Pace, help: str
 ) -> Trace:
-    """Run until the task ends, a limit is passed or the operator is done; what follows is not shown."""
+    """Run until the task ends, a limit is passed or the operator is done; what follows is not shown.
+
+    The screen shows what the channel has delivered, not what is.
+    """
+    late = LatePicture(setup)
     period = setup.scenario.simulation.control_period_s
     ticks = max(1, round(_FRAME_S / period))
     while not (simulation.ended or controls.intent.end):
         controls.poll(simulation.time_s, screen.axes())
         if not screen.is_open:
             controls.end()
+        late.remember(simulation.rows)
         for _ in range(ticks):
             simulation.tick()
         seen = status(
@@ -58,9 +65,40 @@ def drive(
             force_n=_force_on_hand(setup),
             help=help,
         )
-        screen.show(setup.plant.truth(), seen)
+        screen.show(late.delivered(), seen)
         pace.wait(simulation.time_s)
     return simulation.run()
+
+
+class LatePicture:
+    """The states that are under way to the operator's screen, and the one that has arrived.
+
+    A picture is taken once a frame and travels with the packet of its tick: what is shown at t is a state of
+    t less the channel's delay, at most a frame older. Packets that are lost or late leave the picture as it
+    was.
+
+    Args:
+        setup: Of a teleoperation; another task has no channel, and is shown as it is.
+    """
+
+    def __init__(self, setup: Setup) -> None:
+        self._plant = setup.plant
+        self._task = setup.task if isinstance(setup.task, Teleoperation) else None
+        self._shown = setup.plant.truth()
+        self._waiting: deque[tuple[int, Truth]] = deque()
+
+    def remember(self, tick: int) -> None:
+        """Keep the state of now, of the tick that comes; to be called before it."""
+        if self._task is not None:
+            self._waiting.append((tick, self._plant.truth()))
+
+    def delivered(self) -> Truth:
+        """The newest state that has arrived; at first the start."""
+        if self._task is None:
+            return self._plant.truth()
+        while self._waiting and self._waiting[0][0] <= self._task.picture_tick:
+            self._shown = self._waiting.popleft()[1]
+        return self._shown
 
 
 def _force_on_hand(setup: Setup) -> float:

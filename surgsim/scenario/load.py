@@ -4,7 +4,7 @@ import copy
 import json
 import operator
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -136,16 +136,21 @@ def _document(source: Source | Experiment, seed: int | None) -> YamlDocument:
 
 
 def _beside_it(document: YamlDocument) -> YamlDocument:
-    """`document` with the paths of the files of arm and instrument from the scenario's own folder on."""
+    """`document` with paths of files of arm, instrument and channels from the scenario's own folder on."""
     folder, tree = Path(document.source).parent.absolute(), copy.deepcopy(dict(document.tree))
     for _, holder in _holders(tree):
         for part in ("robot", "instrument"):
-            given = holder.get(part)
-            if isinstance(given, dict):
-                given.update(
-                    {key: str(folder / given[key]) for key in KINDS if isinstance(given.get(key), str)}
-                )
+            _from(folder, holder.get(part), KINDS)
+        task = holder.get("task")
+        for channel in task.values() if isinstance(task, dict) else ():
+            _from(folder, channel, ("trace",))
     return replace(document, tree=tree)
+
+
+def _from(folder: Path, given: Any, keys: Iterable[str]) -> None:
+    """Have the paths under `keys` of a mapping begin at `folder`."""
+    if isinstance(given, dict):
+        given.update({key: str(folder / given[key]) for key in keys if isinstance(given.get(key), str)})
 
 
 def _holders(tree: dict[str, Any]) -> list[tuple[KeyPath, dict[str, Any]]]:

@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from surgsim.studies.study import Study
 
 STUDIES: dict[str, str] = {
+    "bilateral_schemes": "surgsim.studies.bilateral_schemes",
     "manipulability_validation": "surgsim.studies.manipulability_validation",
     "passive_teleoperation": "surgsim.studies.passive_teleoperation",
     "vprnn": "surgsim.studies.vprnn",

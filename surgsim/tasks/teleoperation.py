@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from functools import cached_property
-from typing import Literal, Self
+from typing import TYPE_CHECKING, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,14 +24,17 @@ from surgsim.tasks.teleoperation_program import (
     rings_success,
     way_points,
 )
+from surgsim.teleop.bilateral import BILATERAL
+from surgsim.teleop.bilateral.base import BilateralConfig
+from surgsim.teleop.bilateral.ends import describe_law
+from surgsim.teleop.bilateral.passive_convex import PassiveConvexConfig
 from surgsim.teleop.channel import DRAW, Channel, ChannelConfig, draw_packets
 from surgsim.teleop.console import Console, ConsoleConfig
 from surgsim.teleop.mapping import MappingConfig, align
-from surgsim.teleop.messages import MODES, PassivityMode
+from surgsim.teleop.messages import TANK
 from surgsim.teleop.operator import Goal, Hand, OperatorConfig, describe_operator, fill_action, goal_rows
-from surgsim.teleop.passivity_control import PassivityControlConfig
 from surgsim.teleop.receiver import ReceiverConfig, expect
-from surgsim.teleop.tank import TankConfig, fill_tank
+from surgsim.teleop.tank import fill_tank
 from surgsim.teleop.teleoperator import (
     COLUMNS,
     DRAWN,
@@ -51,6 +54,11 @@ from surgsim.tick.status import GOES_ON
 Array = NDArray[np.float64]
 _MOST_PERIODS = 4_000_000
 
+if TYPE_CHECKING:
+    AnyBilateral = BilateralConfig
+else:
+    AnyBilateral = BILATERAL.union()
+
 
 class TeleoperationConfig(PartConfig):
     """Teleoperation through a delayed channel, by a simulated operator at a master console.
@@ -63,19 +71,15 @@ class TeleoperationConfig(PartConfig):
         goal_timeout_s: After this the operator gives up a goal of `peg_and_ring` [s].
         duration_s: Longest time that it may take [s].
         hold_end_s: Time at rest after the last goal [s].
-        passivity: Energy tanks, the time-domain passivity controller, or nothing.
-        stiffness_n_per_m: K_v of the force law, per metre of handle motion [N/m].
-        refill_damping_ns_per_mj: Damper on the handle per joule that its tank lacks; 0: none.
-        drift_gain_per_s: Pull of the tip to the master's position beside its velocity; 0: none [1/s].
-        drift_speed_m_per_s: Limit of that pull [m/s].
+        bilateral: What either side sends, what the hand feels and where the tip is led: a bilateral scheme.
         operator: Eyes, decisions and hand.
         console: The master console.
         mapping: Motion scaling and rotation between console and world.
         channel: The channel to the remote side, and the one back unless `channel_back` is given.
         channel_back: The channel back; null: as `channel`.
+        video: The channel of the picture that the operator sees; null: it comes with the tip's state, by the
+            channel back.
         receiver: How long a set point is believed, on both sides.
-        tanks: The energy tank of each side.
-        passivity_control: The passivity controller of each side.
     """
 
     type: Literal["teleoperation"] = "teleoperation"
@@ -86,19 +90,14 @@ class TeleoperationConfig(PartConfig):
     goal_timeout_s: PositiveFloat = 20.0
     duration_s: PositiveFloat = 60.0
     hold_end_s: NonNegativeFloat = 1.0
-    passivity: PassivityMode = "tank"
-    stiffness_n_per_m: NonNegativeFloat = 60.0
-    refill_damping_ns_per_mj: NonNegativeFloat = 20.0
-    drift_gain_per_s: NonNegativeFloat = 2.0
-    drift_speed_m_per_s: PositiveFloat = 0.02
+    bilateral: AnyBilateral = PassiveConvexConfig()
     operator: OperatorConfig = OperatorConfig()
     console: ConsoleConfig = ConsoleConfig()
     mapping: MappingConfig = MappingConfig()
     channel: ChannelConfig = ChannelConfig()
     channel_back: ChannelConfig | None = None
+    video: ChannelConfig | None = None
     receiver: ReceiverConfig = ReceiverConfig()
-    tanks: TankConfig = TankConfig()
-    passivity_control: PassivityControlConfig = PassivityControlConfig()
 
     @model_validator(mode="after")
     def _one_program(self) -> Self:
@@ -139,7 +138,7 @@ class TeleoperationConfig(PartConfig):
         """Whether every ring is on its peg, or every goal was reached, passively and with rest at the end."""
         if self.program == "peg_and_ring":
             return conducted(rings_success(run), run)
-        return conducted(goals_success(run, len(self.goals)), run)
+        return conducted(goals_success(run, self.goals), run)
 
 
 class Teleoperation:
@@ -160,13 +159,19 @@ class Teleoperation:
     ) -> None:
         self._c, self._start, self._period, self._seed = config, start, period_s, seed
         self._goals = config.program_goals()
-        self._channels = config.channel, config.channel_back or config.channel
+        self._channels = [config.channel, config.channel_back or config.channel]
+        round_trip = sum(channel.delay_s for channel in self._channels)
+        self._channels += [config.video] if config.video else []
         self._hand: Hand | None = None
         self._console = Console(config.console, period_s)
         most = min(config.duration_s / period_s, _MOST_PERIODS)
         lives = [channel.life(period_s, round(most)) for channel in self._channels]
-        self._places = places(*lives, *map(copies, self._channels))
-        self.gains = np.concatenate([np.zeros(LAW_SIZE), goal_rows(self._goals).ravel()])
+        self._scheme = config.bilateral.build(period_s, round_trip)
+        ends = self._scheme.memory_size if self._scheme else 0
+        packets = [(life, copies(channel)) for life, channel in zip(lives, self._channels, strict=True)]
+        self._places = places(packets, ends)
+        own = self._scheme.gains if self._scheme else np.zeros(0)
+        self.gains = np.concatenate([np.zeros(LAW_SIZE), goal_rows(self._goals).ravel(), own])
         self.memory = np.zeros(self._places.end)
         self._describe(lives)
         self.reset()
@@ -194,26 +199,33 @@ class Teleoperation:
         near, far = law.operator, law.remote
         law.hold_end_s, law.start[:], law.force_share = c.hold_end_s, self._start, 1.0
         for side in (near, far):
-            take(side, c)
-            side.passivity, side.period_s = MODES[c.passivity], self._period
+            side.period_s = self._period
             take(side.receiver, c.receiver)
-            take(side.tank, c.tanks)
-            take(side.control, c.passivity_control)
-            side.control.coordinates = c.passivity_control.port_force == "coordinating"
+            describe_law(side, c.bilateral, self._scheme)
+        if self._scheme:
+            begin = self.gains.size - self._scheme.gains.size
+            for side, memory in ((near, at.operator_end), (far, at.remote_end)):
+                side.scheme.gains, side.scheme.gain_count = begin, self._scheme.gains.size
+                side.scheme.memory, side.scheme.memory_size = memory, self._scheme.memory_size
         near.start_tip[:] = self._start
         self._console.describe(near.console)
-        round_trip = sum(channel.delay_s for channel in self._channels)
+        forth, back = self._channels[:2]
+        round_trip = forth.delay_s + (c.video or back).delay_s  # of what the eyes see
         self._noise_m = describe_operator(near.operator, c.operator, self._period, round_trip)
         near.operator.goals, near.operator.goal_count = LAW_SIZE, len(self._goals)
         near.operator.tremor, near.operator.scatter = at.tremor, at.scatter
         lines = (
             (law.forth, far.receiver, at.forth_draws, at.forth_ring, at.forth_taken),
             (law.back, near.receiver, at.back_draws, at.back_ring, at.back_taken),
+            (law.video, near.screen, at.video_draws, at.video_ring, at.video_taken),
         )
+        law.has_video = near.has_video = c.video is not None
+        take(near.screen, c.receiver)
         for (line, receiver, draws, ring, taken), config, life in zip(
-            lines, self._channels, lives, strict=True
+            lines, self._channels, lives, strict=False
         ):
-            line.delay_s, line.draws, line.ring = config.delay_s, draws, ring
+            line.delay_s, line.draws, line.ring = config.bounds()[0], draws, ring
+            line.clock_rate, line.clock_skew_s = 1.0 + 1e-6 * config.clock_drift_ppm, config.clock_skew_s
             line.capacity = life * copies(config)
             line.cumulative = receiver.cumulative = config.energy == "cumulative"
             receiver.taken, receiver.window = taken, life
@@ -228,26 +240,39 @@ class Teleoperation:
         align(law.operator.operator.mapping, c.mapping, near.console.state.position, self._start)
         state.ends = bool(self._goals) or self._hand is not None
         near.in_python = self._hand is not None
+        near.of_scheme = far.of_scheme = self._scheme is not None
         near.scale = 1.0
         for side_law, side in ((law.operator, near), (law.remote, far)):
-            fill_tank(side_law.tank, side.tank)
+            if side_law.passivity == TANK:
+                fill_tank(side_law.tank, side.tank)
             expect(side_law.receiver, side.receiver, memory)
+        if c.video is not None:
+            expect(law.operator.screen, near.screen, memory)
         state.work.p[:] = far.reference[:] = self._start
-        state.forth.drawn = state.back.drawn = near.operator.shaken = near.operator.scattered = DRAWN
+        state.forth.drawn = state.back.drawn = state.video.drawn = DRAWN
+        near.operator.shaken = near.operator.scattered = DRAWN
         self._random = [np.random.default_rng(_child(self._seed, *key)) for key in _STREAMS]
         self.refill(1)
 
     def refill(self, ticks: int) -> None:
         """Draw ahead what the next `ticks` periods may need, at most `DRAWN`."""
         state, at = laid_over(State, self.memory), self._places
-        tremor, scatter, forth, back = self._random
         operator = state.operator.operator
-        used = (state.forth.drawn, state.back.drawn, operator.shaken, operator.scattered)
+        used = [state.forth.drawn, state.back.drawn, operator.shaken, operator.scattered]
+        used += [state.video.drawn] if self._c.video else []
         if DRAWN - max(used) >= ticks:
             return
+        tremor, scatter, *of_channels = self._random
+        lines = zip(
+            (state.forth, state.back, state.video),
+            self._channels,
+            of_channels,
+            (at.forth_draws, at.back_draws, at.video_draws),
+            strict=False,
+        )
 
         def packets(channel: Channel, config: ChannelConfig, random: np.random.Generator) -> _Draw:
-            return lambda rows: draw_packets(config, channel, random, rows)
+            return lambda rows: draw_packets(config, channel, random, rows, self._period)
 
         def shakes(rows: Array) -> None:
             rows[:] = self._noise_m * tremor.standard_normal(rows.shape)
@@ -264,10 +289,7 @@ class Teleoperation:
             draw(rows[left:])
             return 0
 
-        for channel, config, random, begin in (
-            (state.forth, self._channels[0], forth, at.forth_draws),
-            (state.back, self._channels[1], back, at.back_draws),
-        ):
+        for channel, config, random, begin in lines:
             channel.drawn = top_up(begin, DRAW, int(channel.drawn), packets(channel, config, random))
         operator.shaken = top_up(at.tremor, 3, int(operator.shaken), shakes)
         operator.scattered = top_up(at.scatter, 3, int(operator.scattered), misses)
@@ -276,8 +298,14 @@ class Teleoperation:
         """Let the hand in Python act, in the midst of a period."""
         assert self._hand is not None
         side = laid_over(State, self.memory).operator
-        command = self._hand.step(float(side.t_s), side.tip.copy(), side.console.state.copy())
+        command = self._hand.step(float(side.t_s), side.seen.copy(), side.console.state.copy())
         fill_action(side.hand, command)
+
+    @property
+    def picture_tick(self) -> int:
+        """Tick whose picture is on the operator's screen: that of the newest packet; -1 before the first."""
+        side = laid_over(State, self.memory).operator
+        return int((side.screen if self._c.video else side.receiver).highest)
 
     def enter(self, entry: Array) -> None:
         """Let the kernel call the C function that enters `act` (1,), see `surgsim.tick.python_part`."""
@@ -319,8 +347,8 @@ class Teleoperation:
 
 
 _Draw = Callable[[Array], None]
-_STREAMS = ((0, 0), (0, 1), (1,), (2,))
-"""Children of the seed: tremor, scatter, packets to the remote side and back."""
+_STREAMS = ((0, 0), (0, 1), (1,), (2,), (3,))
+"""Children of the seed: tremor, scatter, packets to the remote side, back, and of the picture."""
 
 
 def _child(seed: np.random.SeedSequence, *key: int) -> np.random.SeedSequence:

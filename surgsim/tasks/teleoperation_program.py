@@ -10,7 +10,7 @@ from surgsim.catalog import PartConfig
 from surgsim.models.config import Vec3
 from surgsim.models.peg_board import PegBoardLayout, transfer_goals
 from surgsim.tasks.success import RunColumns, Success
-from surgsim.teleop.judgement import faults
+from surgsim.teleop.judgement import faults, stuck
 from surgsim.teleop.operator import Goal
 
 Array = NDArray[np.float64]
@@ -92,11 +92,17 @@ def rings_success(run: RunColumns) -> Success:
     """Success of the transfers of a peg board: every ring rests on its target peg at the end."""
     on_target = run.block("ring_state")[-1] == RING_ON_TARGET
     moved, count = int(np.count_nonzero(on_target)), len(on_target)
-    return Success(done=moved == count, reason=f"{moved} of {count} rings are on their pegs")
+    why = stuck(run) if moved < count else ""
+    reason = f"{moved} of {count} rings are on their pegs" + (f": {why}" if why else "")
+    return Success(done=moved == count, reason=reason)
 
 
-def goals_success(run: RunColumns, count: int) -> Success:
-    """Success of a program of `count` goals: the operator has reached each of them, and given up none."""
+def goals_success(run: RunColumns, goals: tuple[GoalConfig, ...]) -> Success:
+    """Success of a program of goals: the operator has reached each of them, and given up none.
+
+    Where one was not reached, the reason names what was stuck.
+    """
+    count = len(goals)
     if count == 0:
         return Success(done=None, reason="the operator has no goals")
     at, missed = int(run["goal"][-1]), int(run["goals_missed"][-1])
@@ -104,8 +110,12 @@ def goals_success(run: RunColumns, count: int) -> Success:
         return Success(done=None, reason="a person operated, whose goals nobody counts")
     if at < count:
         left = f"the operator was still at goal {at + 1} of {count} when time was up"
-        return Success(done=False, reason=left + (f", {missed} missed" if missed else ""))
-    return Success(done=missed == 0, reason=f"{count - missed} of {count} goals were reached")
+        why = stuck(run, np.array(goals[at].position_m))
+        left += f", {missed} missed" if missed else ""
+        return Success(done=False, reason=left + (f": {why}" if why else ""))
+    why = stuck(run) if missed else ""
+    reason = f"{count - missed} of {count} goals were reached" + (f": {why}" if why else "")
+    return Success(done=missed == 0, reason=reason)
 
 
 def conducted(found: Success, run: RunColumns) -> Success:

@@ -15,6 +15,8 @@ from surgsim.tick.views import vector
 
 JOINTS = ("yaw", "shoulder", "elbow", "gimbal_yaw", "gimbal_pitch", "gimbal_roll")
 _N = len(JOINTS)
+AT_STOP_RAD = 0.002
+"""A joint nearer to the end of its range than this is on its stop."""
 
 
 class ConsoleConfig(PartConfig):
@@ -55,6 +57,7 @@ class ConsoleState(Record):
         rotation: Handle axes in O (3, 3).
         velocity: Handle velocity (3,) [m/s].
         angular_velocity: Handle angular velocity in O (3,) [rad/s].
+        stop: Number of the joint on its stop, the first of `JOINTS` is 1; 0 if none is.
     """
 
     SHAPES: ClassVar[dict[str, str]] = {
@@ -72,6 +75,7 @@ class ConsoleState(Record):
     rotation: Array
     velocity: Array
     angular_velocity: Array
+    stop: int
 
 
 class ConsoleEnergy(Record):
@@ -123,9 +127,13 @@ class ConsoleLaw(Record):
         least_mass_kg: As in `ConsoleConfig`.
         torque_limit: Of the motors (6,) [N m].
         damping: Viscous joint friction (6,) [N m s/rad].
+        q_min: Where the joints' ranges begin (6,) [rad].
+        q_max: Where they end (6,) [rad].
     """
 
-    SHAPES: ClassVar[dict[str, str]] = {"torque_limit": str(_N), "damping": str(_N)}
+    SHAPES: ClassVar[dict[str, str]] = {
+        name: str(_N) for name in ("torque_limit", "damping", "q_min", "q_max")
+    }
     mj_model: int
     mj_data: int
     qpos: int
@@ -145,6 +153,8 @@ class ConsoleLaw(Record):
     least_mass_kg: float
     torque_limit: Array
     damping: Array
+    q_min: Array
+    q_max: Array
 
 
 class ConsoleMemory(Record):
@@ -180,8 +190,11 @@ def measure_console(law: ConsoleLaw, console: ConsoleMemory) -> None:
     mj_jacSite(law.mj_model, law.mj_data, J.ctypes.data, J.ctypes.data + 8 * 3 * _N, law.site)
     place, turn = vector(law.site_xpos, 3), vector(law.site_xmat, 9)
     qpos, qvel, energy = vector(law.qpos, _N), vector(law.qvel, _N), vector(law.energy, 2)
+    state.stop = 0
     for i in range(_N):
         state.q[i], state.v[i] = qpos[i], qvel[i]
+        if not law.q_min[i] + AT_STOP_RAD < qpos[i] < law.q_max[i] - AT_STOP_RAD:
+            state.stop = i + 1
     times(J[:3], qvel, state.velocity)
     times(J[3:], qvel, state.angular_velocity)
     for i in range(3):
@@ -292,6 +305,7 @@ class Console:
         law.substeps, law.timestep_s = self._substeps, model.opt.timestep
         law.force_limit_n, law.least_mass_kg = c.force_limit_n, c.least_mass_kg
         law.torque_limit[:], law.damping[:] = model.jnt_actfrcrange[:, 1], model.dof_damping.reshape(-1)
+        law.q_min[:], law.q_max[:] = model.jnt_range.T
 
     def reset(self, law: "ConsoleLaw", memory: "ConsoleMemory") -> None:
         """Put the arm at rest at its home pose; `memory` must be zeros."""

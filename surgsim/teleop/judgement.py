@@ -9,6 +9,8 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from surgsim.teleop.console import JOINTS
+
 Array = NDArray[np.float64]
 PASSIVE_J = 1e-3
 """Energy delivered beyond what was stored, up to which a run is called passive [J]."""
@@ -36,13 +38,11 @@ class Columns(Protocol):
 
 
 def excess_j(run: Columns) -> float:
-    """Largest energy that hand and surroundings got, less what the tanks held at first [J].
+    """Largest energy that hand and surroundings got, less what tanks and channels held at first [J].
 
-    A passive teleoperator keeps it at or below 0. Without tanks nothing is stored.
+    A passive teleoperator keeps it at or below 0. Without tanks nothing is stored, and their columns are 0.
     """
-    stored = 0.0
-    if np.isfinite(run["tank_account_residual_j"]).all():
-        stored = float(run["tank_operator_j"][0] + run["tank_remote_j"][0])
+    stored = float(run["tank_operator_j"][0] + run["tank_remote_j"][0] + run["in_flight_j"][0])
     return float(np.nanmax(run["delivered_j"])) - stored
 
 
@@ -127,6 +127,27 @@ def transmitted_impedance(run: Columns, late_s: float) -> tuple[float, float]:
     x, v, force = (np.concatenate(each) for each in rows)
     fit = np.linalg.lstsq(np.column_stack([x, v]), -force, rcond=None)[0]
     return float(fit[0]), float(fit[1])
+
+
+def stuck(run: Columns, goal: Array | None = None) -> str:
+    """What kept the operator from a goal when time was up, in words; empty where nothing shows.
+
+    The handle on its stop at the end or for a second in all, a dead link, the tip pressing on something, and
+    else how far the tip is from `goal` (3,) [m].
+    """
+    stops = run["handle_stop"].astype(int) if "handle_stop" in run else np.zeros(len(run), dtype=int)
+    period = float(np.median(np.diff(run["t_s"]))) if len(run) > 1 else 0.0
+    held_s = period * np.count_nonzero(stops)
+    if stops[-1] > 0 or held_s >= 1.0:
+        joint = JOINTS[np.bincount(stops[stops > 0]).argmax() - 1]
+        return f"the handle was on the stop of the console's {joint} joint for {held_s:.3g} s"
+    if "setpoint_trust" in run and run["setpoint_trust"][-1] == 0.0:
+        return "nothing arrives at the remote side"
+    if "tip_force" in run and _touches(run)[-1]:
+        return f"the tip presses on something with {np.linalg.norm(run.block('tip_force')[-1]):.3g} N"
+    if goal is None or "tip" not in run:
+        return ""
+    return f"the tip is {1e3 * np.linalg.norm(run.block('tip')[-1] - goal):.3g} mm from it"
 
 
 def faults(run: Columns) -> list[str]:

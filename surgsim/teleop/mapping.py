@@ -104,6 +104,26 @@ def motion_to_console(mapping: Mapping, v_W: Array, out: Array) -> None:
 
 
 @compiled
+def force_to_remote(mapping: Mapping, f_O: Array, out: Array) -> None:
+    """Force R_WO f_O / s (3,) at the tip that has the power of f_O at the handle; not in place."""
+    for i in range(3):
+        turned = 0.0
+        for k in range(3):
+            turned += mapping.R_WO[i, k] * f_O[k]
+        out[i] = turned / mapping.scale
+
+
+@compiled
+def force_to_console(mapping: Mapping, f_W: Array, out: Array) -> None:
+    """Force s R_OW f_W (3,) at the handle that has the power of f_W at the tip; not in place."""
+    for i in range(3):
+        turned = 0.0
+        for k in range(3):
+            turned += f_W[k] * mapping.R_WO[k, i]
+        out[i] = mapping.scale * turned
+
+
+@compiled
 def feedback_force(
     mapping: Mapping, p_handle_O: Array, p_tip_W: Array, stiffness_n_per_m: float, out: Array
 ) -> None:

@@ -2,15 +2,15 @@
 
 From the operator's side: the tip's position and velocity that the handle stands for, and how far the jaws
 close. From the remote side: the tip's position, also what the screen shows, and the force of the tip on its
-environment, which is shown and not used by the force law.
+environment. A bilateral scheme may send something else in the places of velocity and force.
 """
 
 from typing import Literal
 
 PassivityMode = Literal["tank", "tdpa", "off"]
-TANK, TDPA, OFF = range(3)
+TANK, TDPA, OFF, SCHEME = range(4)
 MODES: dict[PassivityMode, int] = {"tank": TANK, "tdpa": TDPA, "off": OFF}
-"""The number that stands for a mode in a record."""
+"""The number that stands for a mode in a record; SCHEME: a bilateral scheme decides."""
 
-POSITION, VELOCITY, FORCE, JAW, CONTENT = 0, 3, 3, 6, 7
-"""Where in a message position (3,) [m], velocity (3,) [m/s] or force (3,) [N], and jaw are; its length."""
+POSITION, VELOCITY, FORCE, JAW, CONTENT = 0, 3, 6, 9, 10
+"""Where in a message position (3,) [m], velocity (3,) [m/s], force (3,) [N] and jaw are; its length."""

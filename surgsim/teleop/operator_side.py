@@ -1,13 +1,21 @@
-"""The operator's side: console, hand, force law, tank or passivity controller."""
+"""The operator's side: console, hand, force law, tank or passivity controller, or a scheme's end."""
 
 from typing import ClassVar
 
 from surgsim.columns import scalar, vector
 from surgsim.compiled import compiled
+from surgsim.teleop.bilateral.base import End
+from surgsim.teleop.bilateral.ends import CalledScheme, feel, see, tell
 from surgsim.teleop.channel import Channel, ChannelLaw
 from surgsim.teleop.console import ConsoleLaw, ConsoleMemory, renderable, step_console
-from surgsim.teleop.mapping import feedback_force, motion_to_remote, to_remote
-from surgsim.teleop.messages import CONTENT, JAW, OFF, POSITION, TDPA, VELOCITY
+from surgsim.teleop.mapping import (
+    feedback_force,
+    force_to_console,
+    force_to_remote,
+    motion_to_remote,
+    to_remote,
+)
+from surgsim.teleop.messages import CONTENT, JAW, OFF, POSITION, SCHEME, TDPA, VELOCITY
 from surgsim.teleop.operator import HandAction, Operator, OperatorLaw, operate
 from surgsim.teleop.passivity_control import PassivityLaw, PortEnergy, impedance_control, observe, observed
 from surgsim.teleop.receiver import Receiver, ReceiverLaw, receive
@@ -42,6 +50,7 @@ OPERATOR_COLUMNS = (
     scalar("goal"),
     scalar("goals_missed"),
     scalar("operator_done"),
+    scalar("handle_stop"),
 )
 
 
@@ -49,7 +58,7 @@ class OperatorSideLaw(Record):
     """Numbers of the operator's side.
 
     Attributes:
-        passivity: TANK, TDPA or OFF.
+        passivity: TANK, TDPA or OFF; SCHEME: the force is the scheme's.
         period_s: Control period [s].
         stiffness_n_per_m: K_v of the force law, per metre of handle motion.
         refill_damping_ns_per_mj: Damper on the handle per joule that its tank lacks.
@@ -58,8 +67,11 @@ class OperatorSideLaw(Record):
         console: The console.
         operator: The simulated operator, and the mapping between console and world.
         receiver: Of what comes from the remote side.
+        has_video: Whether the picture has a channel of its own.
+        screen: The receiver of the picture.
         tank: The energy tank.
         control: The passivity controller.
+        scheme: The bilateral scheme.
     """
 
     SHAPES: ClassVar[dict[str, str]] = {"entry": "1", "start_tip": "3"}
@@ -72,8 +84,11 @@ class OperatorSideLaw(Record):
     console: ConsoleLaw
     operator: OperatorLaw
     receiver: ReceiverLaw
+    has_video: int
+    screen: ReceiverLaw
     tank: TankLaw
     control: PassivityLaw
+    scheme: CalledScheme
 
 
 class OperatorSide(Record):
@@ -81,30 +96,36 @@ class OperatorSide(Record):
 
     Attributes:
         in_python: Whether the hand is a Python part.
+        of_scheme: Whether the energy is the bilateral scheme's.
         t_s: Time [s].
         scale: Share of the force that the tank can pay for.
         tip: The tip as it is known (3,) [m].
+        seen: The tip as the screen shows it (3,) [m].
         wrench: What the motors are to render, force and zeros (6,) [N, N m].
         desired: Force before the tank or the passivity controller (3,) [N].
         path: Motion of the handle over the period (3,) [m].
-        content: The message, seven numbers.
+        content: The message, ten numbers.
         console: The console.
         hand: What the hand does.
         operator: The simulated operator.
         receiver: Of what comes from the remote side.
+        screen: Of the picture.
         tank: The energy tank.
         port: The passivity observer.
+        end: What a bilateral scheme sees and answers.
     """
 
     SHAPES: ClassVar[dict[str, str]] = {
         "wrench": "6",
         "content": str(CONTENT),
-        **{name: "3" for name in ("tip", "desired", "path")},
+        **{name: "3" for name in ("tip", "seen", "desired", "path")},
     }
     in_python: int
+    of_scheme: int
     t_s: float
     scale: float
     tip: Array
+    seen: Array
     wrench: Array
     desired: Array
     path: Array
@@ -113,8 +134,19 @@ class OperatorSide(Record):
     hand: HandAction
     operator: Operator
     receiver: Receiver
+    screen: Receiver
     tank: Tank
     port: PortEnergy
+    end: End
+
+
+@compiled
+def look(law: OperatorSideLaw, side: OperatorSide, line: ChannelLaw, channel: Channel, memory: Array) -> None:
+    """Show the newest picture that has come by a channel of its own."""
+    receive(law.screen, side.screen, line, channel, memory, side.t_s)
+    known = side.screen.highest >= 0
+    for i in range(3):
+        side.seen[i] = side.screen.content[POSITION + i] if known else law.start_tip[i]
 
 
 @compiled
@@ -122,10 +154,14 @@ def receive_at_operator(
     law: OperatorSideLaw, side: OperatorSide, line: ChannelLaw, channel: Channel, memory: Array
 ) -> float:
     """Take what has arrived, and find the force of the law; the energy that came with it [J]."""
+    before = side.receiver.highest
     received = receive(law.receiver, side.receiver, line, channel, memory, side.t_s)
+    side.end.fresh = 1 if side.receiver.highest > before else 0
     known = side.receiver.highest >= 0
     for i in range(3):
         side.tip[i] = side.receiver.content[POSITION + i] if known else law.start_tip[i]
+        if not law.has_video:
+            side.seen[i] = side.tip[i]
     handle = side.console.state
     feedback_force(law.operator.mapping, handle.position, side.tip, law.stiffness_n_per_m, side.desired)
     renderable(law.console, side.console, side.desired)
@@ -158,6 +194,40 @@ def make_passive(law: OperatorSideLaw, side: OperatorSide) -> None:
     side.scale = affordable(work, own, level(side.tank) - law.tank.floor_j)
     for i in range(3):
         force[i] = side.scale * force[i]
+
+
+@compiled
+def _place_end(law: OperatorSideLaw, side: OperatorSide) -> None:
+    """The handle as the scheme sees it: in the axes and the scale of the tip."""
+    end, handle, mapping = side.end, side.console.state, law.operator.mapping
+    to_remote(mapping, handle.position, end.position)
+    motion_to_remote(mapping, handle.velocity, end.velocity)
+    force_to_remote(mapping, side.hand.wrench[:3], end.force)
+
+
+@compiled
+def _feel(law: OperatorSideLaw, gains: Array, side: OperatorSide, memory: Array, received_j: float) -> int:
+    """The force of the bilateral scheme, within what the console can render."""
+    end, mapping = side.end, law.operator.mapping
+    see(law.receiver, side.receiver, end, side.t_s, law.period_s, received_j)
+    end.mobility_per_kg = mapping.scale * mapping.scale / law.console.least_mass_kg
+    _place_end(law, side)
+    status = feel(law.scheme, gains, end, memory)
+    force_to_console(mapping, end.command, side.desired)
+    renderable(law.console, side.console, side.desired)
+    for i in range(3):
+        side.wrench[i] = side.desired[i]
+    return status
+
+
+@compiled
+def _tell(law: OperatorSideLaw, gains: Array, side: OperatorSide, memory: Array, rendered_j: float) -> int:
+    """The message of the bilateral scheme."""
+    _place_end(law, side)
+    side.end.work_j = rendered_j
+    status = tell(law.scheme, gains, side.end, memory)
+    side.content[:] = side.end.content
+    return status
 
 
 @compiled
@@ -208,15 +278,26 @@ def step_operator_side(
         A status, and the energy to be sent [J].
     """
     received = receive_at_operator(law, side, line, channel, memory)
-    make_passive(law, side)
     status = GOES_ON
+    if law.passivity == SCHEME:
+        status = _feel(law, gains, side, memory, received)
+    else:
+        make_passive(law, side)
+    if status != GOES_ON:
+        return status, 0.0
     if side.in_python:
         status = enter(law.entry)
     else:
-        operate(law.operator, gains, side.operator, memory, side.t_s, side.tip, side.console.state, side.hand)
+        operate(
+            law.operator, gains, side.operator, memory, side.t_s, side.seen, side.console.state, side.hand
+        )
     if status != GOES_ON:
         return status, 0.0
     rendered = _move_console(law, side)
+    if law.passivity == SCHEME:
+        status = _tell(law, gains, side, memory, rendered)
+        side.content[JAW] = side.hand.jaw
+        return status, side.end.energy_j
     energy = _settle(law, side, rendered, received)
     handle = side.console.state
     to_remote(law.operator.mapping, handle.position, side.content[POSITION : POSITION + 3])
@@ -239,3 +320,7 @@ def fill_operator_columns(side: OperatorSide, out: Array) -> None:
         out[15 + i], out[18 + i] = handle.position[i], handle.velocity[i]
         out[21 + i], out[24 + i], out[27 + i] = side.wrench[i], hand.wrench[i], hand.intended[i]
     out[30], out[31], out[32], out[33] = hand.jaw, hand.goal, hand.missed, hand.done
+    out[34] = handle.stop
+    if side.of_scheme:
+        end = side.end
+        out[0], out[1], out[2], out[5] = end.stored_j, end.burnt_j, end.deficit_j, end.observed_j

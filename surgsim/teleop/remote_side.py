@@ -5,8 +5,10 @@ from typing import ClassVar
 
 from surgsim.columns import scalar, vector
 from surgsim.compiled import compiled
+from surgsim.teleop.bilateral.base import End
+from surgsim.teleop.bilateral.ends import CalledScheme, follow, see
 from surgsim.teleop.channel import Channel, ChannelLaw
-from surgsim.teleop.messages import JAW, OFF, POSITION, TDPA, VELOCITY
+from surgsim.teleop.messages import JAW, OFF, POSITION, SCHEME, TDPA, VELOCITY
 from surgsim.teleop.passivity_control import (
     PassivityLaw,
     PortEnergy,
@@ -21,6 +23,7 @@ from surgsim.teleop.receiver import Receiver, ReceiverLaw, receive, trust
 from surgsim.teleop.tank import Tank, TankLaw, budget, exchange, level, send_surplus
 from surgsim.tick.algebra import dot, norm
 from surgsim.tick.arrays import Array, Record
+from surgsim.tick.status import GOES_ON
 
 REMOTE_COLUMNS = (
     scalar("tank_remote", "j"),
@@ -43,13 +46,14 @@ class RemoteSideLaw(Record):
     """Numbers of the remote side.
 
     Attributes:
-        passivity: TANK, TDPA or OFF.
+        passivity: TANK, TDPA or OFF; SCHEME: the velocity is the scheme's.
         period_s: Control period [s].
         drift_gain_per_s: Pull of the tip to the master's position beside its velocity.
         drift_speed_m_per_s: Limit of that pull.
         receiver: Of what comes from the operator's side.
         tank: The energy tank.
         control: The passivity controller.
+        scheme: The bilateral scheme.
     """
 
     passivity: int
@@ -59,6 +63,7 @@ class RemoteSideLaw(Record):
     receiver: ReceiverLaw
     tank: TankLaw
     control: PassivityLaw
+    scheme: CalledScheme
 
 
 class RemoteSide(Record):
@@ -77,6 +82,8 @@ class RemoteSide(Record):
         receiver: Of what comes from the operator's side.
         tank: The energy tank.
         port: The passivity observer.
+        of_scheme: Whether the energy is the bilateral scheme's.
+        end: What a bilateral scheme sees and answers.
     """
 
     SHAPES: ClassVar[dict[str, str]] = {
@@ -94,6 +101,8 @@ class RemoteSide(Record):
     receiver: Receiver
     tank: Tank
     port: PortEnergy
+    of_scheme: int
+    end: End
 
 
 @compiled
@@ -158,8 +167,36 @@ def _observed_set_point(
 
 
 @compiled
+def _follow(
+    law: RemoteSideLaw,
+    gains: Array,
+    side: RemoteSide,
+    memory: Array,
+    t_s: float,
+    received_j: float,
+    position: Array,
+    velocity: Array,
+    work_j: float,
+) -> int:
+    """The velocity of the bilateral scheme, and its message."""
+    end = side.end
+    see(law.receiver, side.receiver, end, t_s, law.period_s, received_j)
+    side.trust = end.trust
+    if side.receiver.highest >= 0:
+        side.jaw = side.receiver.content[JAW]
+    end.work_j = work_j
+    for i in range(3):
+        end.position[i], end.velocity[i], end.force[i] = position[i], velocity[i], side.force[i]
+    status = follow(law.scheme, gains, end, memory)
+    for i in range(3):
+        side.velocity[i] = end.command[i]
+    return status
+
+
+@compiled
 def step_remote_side(
     law: RemoteSideLaw,
+    gains: Array,
     side: RemoteSide,
     line: ChannelLaw,
     channel: Channel,
@@ -169,11 +206,12 @@ def step_remote_side(
     velocity: Array,
     force: Array,
     work_j: float,
-) -> float:
+) -> tuple[int, float]:
     """Receive, book the environment's work, set point: the command for the period from `t_s`.
 
     Args:
         law: Numbers of the side.
+        gains: All numbers, among them those of a bilateral scheme.
         side: Its state, with the command in it afterwards.
         line: Numbers of the channel from the operator's side.
         channel: The channel.
@@ -185,22 +223,27 @@ def step_remote_side(
         work_j: Energy that the tip gave to its environment in the last period; negative if it absorbed some.
 
     Returns:
-        The energy to be sent [J].
+        A status, and the energy to be sent [J].
     """
+    before = side.receiver.highest
     received = receive(law.receiver, side.receiver, line, channel, memory, t_s)
+    side.end.fresh = 1 if side.receiver.highest > before else 0
     side.environment_j += work_j
     side.budget_j = math.inf
     for i in range(3):
         side.force[i] = force[i]
+    if law.passivity == SCHEME:
+        status = _follow(law, gains, side, memory, t_s, received, position, velocity, work_j)
+        return status, side.end.energy_j
     if law.passivity == TDPA:
-        return _observed_set_point(law, side, position, velocity, t_s, received)
+        return GOES_ON, _observed_set_point(law, side, position, velocity, t_s, received)
     _set_point(law, side, position, t_s)
     if law.passivity == OFF:
-        return 0.0
+        return GOES_ON, 0.0
     exchange(law.tank, side.tank, work_j, received)
     energy = send_surplus(law.tank, side.tank, law.period_s)
     side.budget_j = budget(law.tank, side.tank)
-    return energy
+    return GOES_ON, energy
 
 
 @compiled
@@ -214,3 +257,6 @@ def fill_remote_columns(side: RemoteSide, out: Array) -> None:
     for i in range(3):
         out[11 + i] = side.velocity[i]
     out[14] = side.jaw
+    if side.of_scheme:
+        end = side.end
+        out[0], out[1], out[2], out[5] = end.stored_j, end.burnt_j, end.deficit_j, end.observed_j

@@ -7,18 +7,21 @@ The numbers are a `Law`, then the goals' rows; the memory is a `State`, then the
 """
 
 import math
+from collections.abc import Sequence
 from typing import ClassVar, NamedTuple
 
 from surgsim.columns import scalar, vector, width
 from surgsim.compiled import compiled
 from surgsim.teleop.account import ACCOUNT_COLUMNS, fill_account
 from surgsim.teleop.channel import DRAW, PACKET, Channel, ChannelConfig, ChannelLaw, send
-from surgsim.teleop.messages import CONTENT, FORCE, POSITION, TANK, VELOCITY
+from surgsim.teleop.mapping import motion_to_remote
+from surgsim.teleop.messages import CONTENT, FORCE, POSITION, SCHEME, TANK
 from surgsim.teleop.operator_side import (
     OPERATOR_COLUMNS,
     OperatorSide,
     OperatorSideLaw,
     fill_operator_columns,
+    look,
     step_operator_side,
 )
 from surgsim.teleop.remote_side import (
@@ -59,6 +62,8 @@ class Law(Record):
         remote: The remote side.
         forth: The channel to the remote side.
         back: The channel from it.
+        has_video: Whether the picture has a channel of its own.
+        video: That channel.
     """
 
     SHAPES: ClassVar[dict[str, str]] = {"start": "3"}
@@ -69,6 +74,8 @@ class Law(Record):
     remote: RemoteSideLaw
     forth: ChannelLaw
     back: ChannelLaw
+    has_video: int
+    video: ChannelLaw
 
 
 class State(Record):
@@ -79,11 +86,12 @@ class State(Record):
         is_done: Whether the operator is done.
         done_s: Since when [s].
         velocity: v_d of the last period (3,) [m/s].
-        content: The message of the remote side, seven numbers.
+        content: The message of the remote side, ten numbers.
         operator: The operator's side.
         remote: The remote side.
         forth: The channel to the remote side.
         back: The channel from it.
+        video: That of the picture.
         work: Of the tip.
     """
 
@@ -97,6 +105,7 @@ class State(Record):
     remote: RemoteSide
     forth: Channel
     back: Channel
+    video: Channel
     work: TipWork
 
 
@@ -110,32 +119,45 @@ class Places(NamedTuple):
     Attributes:
         forth_draws: What happens to the packets to the remote side (DRAWN, 3).
         back_draws: To those from it.
+        video_draws: To those of the picture.
         tremor: Noise of the tremor (DRAWN, 3) [m].
         scatter: Of the movements (DRAWN, 3).
         forth_taken: Numbers of the packets that the remote side took.
         back_taken: That the operator's side took.
+        video_taken: That the operator's screen took.
         forth_ring: Packets under way to the remote side.
         back_ring: From it.
+        video_ring: Of the picture.
+        operator_end: Memory of the bilateral scheme at the operator's end.
+        remote_end: At the remote one.
         end: Length of the memory.
     """
 
     forth_draws: int
     back_draws: int
+    video_draws: int
     tremor: int
     scatter: int
     forth_taken: int
     back_taken: int
+    video_taken: int
     forth_ring: int
     back_ring: int
+    video_ring: int
+    operator_end: int
+    remote_end: int
     end: int
 
 
-def places(forth: int, back: int, forth_copies: int, back_copies: int) -> Places:
-    """Places for channels in which a packet lives for so many periods, in so many copies."""
+def places(packets: Sequence[tuple[int, int]], scheme: int = 0) -> Places:
+    """Places for channels whose packets live so many periods, in so many copies, and for a scheme."""
+    every = (*packets, *[(0, 0)] * (3 - len(packets)))
     sizes = (
-        *(DRAW * DRAWN, DRAW * DRAWN, 3 * DRAWN, 3 * DRAWN),
-        *(forth, back),
-        *(PACKET * forth * forth_copies, PACKET * back * back_copies),
+        *(DRAW * DRAWN if life else 0 for life, _ in every),
+        *(3 * DRAWN, 3 * DRAWN),
+        *(life for life, _ in every),
+        *(PACKET * life * copied for life, copied in every),
+        *(scheme, scheme),
     )
     begins = [STATE_SIZE]
     for size in sizes:
@@ -159,6 +181,8 @@ def teleoperate(gains: Array, feedback: Feedback, memory: Array, out: Command) -
     law, state, t_s = gains[:LAW_SIZE].view(LAW)[0], memory[:STATE_SIZE].view(STATE)[0], feedback.t_s
     operator, remote = state.operator, state.remote
     operator.t_s = t_s
+    if law.has_video:
+        look(law.operator, operator, law.video, state.video, memory)
     status, energy = step_operator_side(law.operator, gains, operator, law.back, state.back, memory)
     if status != GOES_ON:
         return status
@@ -167,10 +191,16 @@ def teleoperate(gains: Array, feedback: Feedback, memory: Array, out: Command) -
     p, force = state.content[POSITION : POSITION + 3], state.content[FORCE : FORCE + 3]
     for i in range(3):
         p[i], force[i] = feedback.p_WT[i], -feedback.f_T[i]
-    energy = step_remote_side(
-        law.remote, remote, law.forth, state.forth, memory, t_s, p, feedback.v_WT, force, work
+    status, energy = step_remote_side(
+        law.remote, gains, remote, law.forth, state.forth, memory, t_s, p, feedback.v_WT, force, work
     )
+    if status != GOES_ON:
+        return status
+    if law.remote.passivity == SCHEME:
+        state.content[:] = remote.end.content
     send(law.back, state.back, memory, t_s, state.content, energy)
+    if law.has_video:
+        send(law.video, state.video, memory, t_s, state.content, 0.0)
     if operator.hand.done and not state.is_done:
         state.is_done, state.done_s = 1, t_s
     over = state.ends and state.is_done and t_s >= state.done_s + law.hold_end_s
@@ -201,6 +231,6 @@ def _record(law: Law, state: State, t_s: float, values: Array) -> None:
     fill_operator_columns(operator, values)
     fill_remote_columns(remote, values[_REMOTE:])
     fill_account(law.operator, operator, law.remote, remote, state.forth, state.back, values[_ACCOUNT:])
-    for i in range(3):
-        values[_ISSUED + i] = operator.content[VELOCITY + i]
+    velocity = operator.console.state.velocity
+    motion_to_remote(law.operator.operator.mapping, velocity, values[_ISSUED : _ISSUED + 3])
     values[_AGE] = t_s - remote.receiver.sent_s if remote.receiver.highest >= 0 else math.nan

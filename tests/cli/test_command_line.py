@@ -255,6 +255,7 @@ def test_list_prints_names_with_descriptions(capsys, kind):
         ("port-estimators", {"tracking", "interaction_force"}),
         ("instrument-estimators", {"nominal", "tracked"}),
         ("props", {"peg_board", "contact_wall"}),
+        ("bilateral", {"passive_convex", "wave_variables"}),
         ("disturbances", {"payload"}),
         ("metrics", {"tip_error_rms_mm", "rcm_error_max_mm", "sparc", "control_time_p99_us"}),
     ],

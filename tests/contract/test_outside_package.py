@@ -23,6 +23,7 @@ from surgsim.plant.disturbances.payload import PayloadConfig
 from surgsim.plant.dynamic import DynamicPlantConfig
 from surgsim.plant.props.contact_wall import ContactWallConfig
 from surgsim.tasks.circle import CircleConfig
+from surgsim.teleop.bilateral.position_position import PositionPositionConfig
 
 class Resolver(PinvConfig):
     """A resolver of somebody else's."""
@@ -55,6 +56,10 @@ class Prop(ContactWallConfig):
 class Plant(DynamicPlantConfig):
     """A plant of somebody else's."""
     type: Literal["my_plant"] = "my_plant"
+
+class Scheme(PositionPositionConfig):
+    """A bilateral scheme of somebody else's."""
+    type: Literal["my_scheme"] = "my_scheme"
 
 def policy(observation):
     """Go where the command goes."""
@@ -151,6 +156,14 @@ class Plant(PartConfig):
     must: float
     def build(self, scene, period_s, parts, seed): return None
 
+class Scheme(PartConfig):
+    """Left its kernels as they were written."""
+    type: Literal["bad_scheme"] = "bad_scheme"
+    def build(self, period_s, round_trip_s):
+        from surgsim.teleop.bilateral.base import BilateralScheme
+        nothing = lambda gains, end, memory: 0
+        return BilateralScheme(feel=nothing, tell=nothing, follow=nothing)
+
 class Misnamed(PartConfig):
     """A type that is not its name."""
     type: Literal["other"] = "other"
@@ -171,6 +184,7 @@ KINDS = {
     "disturbances": "Disturbance",
     "props": "Prop",
     "plants": "Plant",
+    "bilateral": "Scheme",
     "policies": "policy",
     "metrics": "metric",
 }
@@ -229,6 +243,7 @@ def test_good_parts_of_every_kind_keep_every_promise(surgsim, tmp_path):
         "disturbance",
         "prop",
         "plant",
+        "bilateral scheme",
         "policy",
         "metric",
     }
@@ -248,6 +263,7 @@ BROKEN = {
     ),
     "bad_prop": ("is deterministic under a seed", "6 joints: RuntimeError: no wood left"),
     "bad_plant": ("every key has a default", "must"),
+    "bad_scheme": ("kernels are compiled", "kernel 'feel' must be compiled"),
     "bad_metric": ("gives a number or none, and the same again", "the same run gives 0."),
     "bad_policy": (
         "actions are finite, of one shape",

@@ -157,8 +157,8 @@ def test_it_ends_with_the_scenario_s_time_and_says_what_is_worth_knowing(person,
     assert person("--no-record", "--set", "task.duration_s=0.3") == 0
     folder = tmp_path / "runs" / "teleop_free_motion_panda"
     assert sorted(path.name for path in folder.iterdir()) == [
-        "passive_convex-seed0-keyboard1",
-        "passive_convex-seed0-keyboard2",
+        "passive_kinetic-seed0-keyboard1",
+        "passive_kinetic-seed0-keyboard2",
     ]
     lines = dict(Scripted.shown[-1].lines)
     assert lines["time"] == "0.3 of 0.3 s"

@@ -12,6 +12,7 @@ from surgsim.plant.disturbances import DISTURBANCES
 from surgsim.plant.props import PROPS
 from surgsim.scenario import schema
 from surgsim.tasks import TASKS
+from surgsim.teleop.bilateral import BILATERAL
 
 CATALOGS = (
     TASKS,
@@ -22,6 +23,7 @@ CATALOGS = (
     TORQUE_LAWS,
     PORT_ESTIMATORS,
     INSTRUMENT_ESTIMATORS,
+    BILATERAL,
 )
 
 

@@ -14,6 +14,7 @@ from surgsim.simulate.loop import simulate
 from surgsim.tasks.base import Feedback
 from surgsim.tasks.teleoperation import TeleoperationConfig
 from surgsim.tasks.teleoperation_program import GoalConfig, board_goals, way_points
+from surgsim.teleop.bilateral.passive_convex import PassiveConvexConfig
 from surgsim.teleop.channel import ChannelConfig
 from surgsim.teleop.operator import HandCommand
 from surgsim.teleop.tip_work import TipWork, add_tip_work
@@ -42,7 +43,7 @@ def _follow(task, count, f_T=(0.0, 0.0, 0.0)):
 
 
 def test_the_command_is_what_the_master_stood_for_one_delay_ago():
-    config = TeleoperationConfig(goals=ONE_GOAL, drift_gain_per_s=0.0)
+    config = TeleoperationConfig(goals=ONE_GOAL, bilateral=PassiveConvexConfig(drift_gain_per_s=0.0))
     commands, run = _follow(config.build(START), 1500)
     delay = 150
     for axis, name in enumerate("xyz"):
@@ -66,7 +67,9 @@ def test_another_seed_is_another_hand_and_the_same_seed_the_same():
 
 @pytest.mark.parametrize(("passivity", "limited"), [("tank", True), ("tdpa", False), ("off", False)])
 def test_the_budget_is_the_remote_tank_s_with_the_force_as_measured(passivity, limited):
-    task = TeleoperationConfig(passivity=passivity, goals=ONE_GOAL).build(START)
+    task = TeleoperationConfig(bilateral=PassiveConvexConfig(passivity=passivity), goals=ONE_GOAL).build(
+        START
+    )
     command = _follow(task, 300, f_T=(-3.0, 0.0, 0.0))[0][-1]
     if not limited:
         assert command.budget is None
@@ -195,9 +198,8 @@ def test_equal_runs_are_equal():
 
 
 def test_an_emptied_tank_holds_the_tip_back_in_tissue_and_the_ledger_still_closes():
-    trace = simulate(
-        load_scenario("teleop_tissue_panda", assignments=["theatre=false", "task.duration_s=4.0"])
-    )
+    short = ["theatre=false", "task.duration_s=4.0"]
+    trace = simulate(load_scenario("teleop_tissue_panda", controller="passive_convex", assignments=short))
     metrics = compute_metrics(trace)
     assert metrics["passivity_active_fraction"] > 0.01
     assert metrics["slack_rms_mm_per_s"] > 1.0

@@ -8,6 +8,7 @@ import pytest
 from surgsim.tasks.base import Feedback
 from surgsim.tasks.teleoperation import TeleoperationConfig
 from surgsim.tasks.teleoperation_program import GoalConfig
+from surgsim.teleop.bilateral.passive_convex import PassiveConvexConfig
 from surgsim.teleop.teleoperator import COLUMNS, Law
 from surgsim.tick.overlay import laid_over
 
@@ -47,9 +48,12 @@ class PointMass:
 def _run(goals, *, mass=None, seed=0, duration_s=20.0, change=None, **keys):
     """Signals of a run as columns; stops half a second after the operator is done.
 
-    `keys` are those of the task's config; `change` may change its numbers, a `Law`, before the start.
+    `keys` are those of the task's config or of passive_convex; `change` may change its numbers, a `Law`,
+    before the start.
     """
     mass = mass or PointMass()
+    law = {key: keys.pop(key) for key in set(keys) & set(PassiveConvexConfig.model_fields)}
+    keys.setdefault("bilateral", PassiveConvexConfig(**law))
     task = TeleoperationConfig(goals=goals, **keys).build(mass.p, PERIOD_S, np.random.SeedSequence(seed))
     if change is not None:
         change(laid_over(Law, task.gains))

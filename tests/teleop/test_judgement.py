@@ -3,6 +3,8 @@
 import numpy as np
 import pytest
 
+from surgsim.scenario.load import load_scenario
+from surgsim.simulate.loop import simulate
 from surgsim.tasks.success import Success
 from surgsim.tasks.teleoperation_program import conducted
 from surgsim.teleop.judgement import (
@@ -12,9 +14,11 @@ from surgsim.teleop.judgement import (
     excess_j,
     faults,
     force_fidelity,
+    stuck,
     toggles_per_s,
     transmitted_impedance,
 )
+from surgsim.verdict import judge
 
 T = 0.001
 ROWS = 4000
@@ -38,7 +42,7 @@ def run(**changes):
         name: still for name in ("handle", "handle_velocity", "tip", "tip_ref", "tip_force", "master_force")
     }
     made |= {"t_s": TIME, "delivered": zero, "delivered_j": zero, "tank_account_residual_j": zero}
-    made |= {"tank_operator_j": zero + 0.2, "tank_remote_j": zero + 0.1}
+    made |= {"tank_operator_j": zero + 0.2, "tank_remote_j": zero + 0.1, "in_flight_j": zero}
     return Made(made | changes)
 
 
@@ -49,9 +53,8 @@ def along(values):
 def test_what_was_stored_may_be_delivered_and_no_more():
     given = np.linspace(0.0, 0.35, ROWS)
     assert excess_j(run(delivered_j=given)) == pytest.approx(0.05)
-    assert excess_j(run(delivered_j=given, tank_account_residual_j=np.full(ROWS, np.nan))) == pytest.approx(
-        0.35
-    )
+    without = {name: np.zeros(ROWS) for name in ("tank_operator_j", "tank_remote_j")}
+    assert excess_j(run(delivered_j=given, **without)) == pytest.approx(0.35)
     assert faults(run(delivered_j=0.85 * given)) == []
     assert faults(run(delivered_j=given)) == ["it was active: it delivered 50 mJ more than it had stored"]
 
@@ -106,3 +109,38 @@ def test_a_run_that_moves_on_has_not_done_its_task_though_its_goals_were_reached
     assert conducted(person, moving) is person
     without = Made({name: values for name, values in moving.items() if name != "delivered"})
     assert conducted(found, without) is found
+
+
+@pytest.mark.parametrize(
+    ("changes", "reason"),
+    [
+        ({}, "the tip is 50 mm from it"),
+        ({"tip_force": along(np.full(ROWS, -2.0))}, "the tip presses on something with 2 N"),
+        ({"tip_force": along(2.0 * (TIME < 2.0))}, "the tip is 50 mm from it"),
+        ({"setpoint_trust": 1.0 * (TIME < 3.0)}, "nothing arrives at the remote side"),
+        (
+            {"handle_stop": 2.0 * (TIME >= 3.0)},
+            "the handle was on the stop of the console's shoulder joint for 1 s",
+        ),
+        (
+            {"handle_stop": 1.0 * (TIME < 1.5)},
+            "the handle was on the stop of the console's yaw joint for 1.5 s",
+        ),
+        ({"handle_stop": 1.0 * (TIME < 0.5)}, "the tip is 50 mm from it"),
+    ],
+)
+def test_what_kept_an_operator_from_its_goal_is_named(changes, reason):
+    assert stuck(run(**changes), np.array([0.03, 0.04, 0.0])) == reason
+
+
+def test_a_handle_on_its_stop_is_no_success_and_said_in_one_line():
+    """A goal that this scale puts outside the console's room."""
+    goals = "[{position_m: [0.04, 0.65, -0.03]}]"
+    settings = (f"task.goals={goals}", "task.mapping.scale=0.15", "task.duration_s=4.0", "theatre=false")
+    trace = simulate(load_scenario("teleop_free_motion_panda", assignments=settings))
+    found = judge(trace, {})
+    assert found.success is False
+    assert found.reason.startswith(
+        "the operator was still at goal 1 of 1 when time was up: the handle was on the stop"
+    )
+    assert "\n" not in found.line()

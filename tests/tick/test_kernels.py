@@ -106,7 +106,8 @@ from surgsim.simulate.loop import simulate
 bad = "task.channel={delay_s: 0.005, jitter_s: 0.004, loss: 0.2, burst_packets: 3.0, duplicate: 0.3}"
 soon = ["task.duration_s=0.12", "task.operator.reaction_s=0.01", "task.operator.gaze_time_s=0.01"]
 for mode in ("tank", "tdpa", "off"):
-    trace = simulate(load_scenario("teleop_wall_panda", assignments=[bad, *soon, f"task.passivity={mode}"]))
+    law = f"task.bilateral.passivity={mode}"
+    trace = simulate(load_scenario("teleop_wall_panda", assignments=[bad, *soon, law]))
     kept = [k for k, name in enumerate(trace.columns) if name != "control_time_s"]
     assert np.ptp(trace["handle_z_m"]) > 1e-4 and trace["late_packets"][-1] > 5.0
     print(mode, trace.data[:, kept].tobytes().hex())

@@ -1,10 +1,9 @@
 """The passive teleoperation paper's numbers, its shipped scenarios, one push that is varied, and timing."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 from time import thread_time
-from typing import ClassVar, Literal
+from typing import ClassVar, Literal, get_args
 
 import numpy as np
 
@@ -16,6 +15,7 @@ from surgsim.scenario.load import load_scenario
 from surgsim.scenario.schema import Scenario
 from surgsim.studies.passive_teleoperation.measures import (
     curves_over_time,
+    guarded_measures,
     push_measures,
     shipped_measures,
 )
@@ -28,6 +28,8 @@ from surgsim.trace.trace import Trace
 Place = Literal["wall", "free"]
 Grip = Literal["normal", "light"]
 Link = Literal["clean", "lossy"]
+Guardable = Literal["tissue", "throw"]
+Guard = Literal["row", "nothing", "valve"]
 
 PAPER = Paper(
     title="A Passive Convex Optimal Control Algorithm for Teleoperating a Redundant Robotic Arm in Minimally "
@@ -47,6 +49,29 @@ SHIPPED: dict[str, str] = {
     "peg and ring": "peg_and_ring_panda",
 }
 """The paper's experiment and what it claims, by name."""
+
+_ROW = (
+    "controller.resolver.passivity=true",
+    "controller.resolver.kinetic=false",
+    "controller.torque_law.energy_valve=false",
+    "controller.torque_law.press_max_n=null",
+)
+"""The paper's energy row in place of what the shipped scenarios have: `passive_convex`."""
+_GUARDS: dict[Guard, tuple[str, ...]] = {
+    "row": _ROW,
+    "nothing": (*_ROW[1:], "controller.resolver.passivity=false"),
+    "valve": (),
+}
+_THROW = (
+    "task.bilateral.tanks={initial_j: 0.012, target_j: 0.012}",
+    "task.goals=[{position_m: [0.0, 0.65, -0.12], push: true, dwell_s: 0.5}]",
+    "task.operator={stiffness_n_per_m: 1000.0, damping_ns_per_m: 20.0, reach: "
+    "{speed_limit_m_per_s: 0.5, fitts_a_s: 0.0, fitts_b_s: 0.01, shortest_s: 0.1}}",
+    "task.mapping.scale=1.0",
+    "task.hold_end_s=0.2",
+    "props.0.point_m=[0.0, 0.65, -0.05]",
+)
+"""A hand that goes 90 mm down in a quarter of a second, onto the wall after 20."""
 
 PASSIVITY: tuple[PassivityMode, ...] = ("tank", "tdpa", "off")
 GRIPS: tuple[Grip, ...] = ("normal", "light")
@@ -115,9 +140,10 @@ class Push(SimulatedCase):
             seed=self.seed,
             assignments=[
                 "theatre=false",
+                *_ROW,
                 *_PUSH,
                 *_GRIP[self.grip],
-                f"task.passivity={self.passivity}",
+                f"task.bilateral.passivity={self.passivity}",
                 f"task.duration_s={self.duration_s}",
                 f"task.operator.expected_delay_s={delay_s}",
                 f"task.channel={{delay_s: {delay_s / 2.0}, {_LINK[self.link]}}}",
@@ -154,8 +180,8 @@ class Shipped(SimulatedCase):
         return self.name
 
     def scenario(self) -> Scenario:
-        """The scenario; nothing but its theatre, which has no part in it, is left out."""
-        return load_scenario(SHIPPED[self.name], assignments=["theatre=false", *self.keys])
+        """The scenario; its theatre, which has no part in it, is left out, and the row is the paper's."""
+        return load_scenario(SHIPPED[self.name], assignments=["theatre=false", *_ROW, *self.keys])
 
     def measures(self, trace: Trace) -> Row:
         """Accuracy, tanks, slack, constraints."""
@@ -164,6 +190,34 @@ class Shipped(SimulatedCase):
     def curves(self, trace: Trace) -> Curves:
         """Everything over time."""
         return curves_over_time(trace)
+
+
+@dataclass(frozen=True)
+class Guarded(SimulatedCase):
+    """A run whose remote tank is drawn on, guarded by the paper's row, by the valve, or by nothing.
+
+    Attributes:
+        place: Viscous tissue on 0.03 J in each tank, or a hand that throws the tip at the wall on 0.012 J.
+        guard: What keeps the tip to the tank's budget.
+    """
+
+    place: Guardable
+    guard: Guard
+
+    @property
+    def label(self) -> str:
+        """In words."""
+        return f"{self.place}, {self.guard}"
+
+    def scenario(self) -> Scenario:
+        """The scenario with this guard."""
+        name = "teleop_tissue_panda" if self.place == "tissue" else SHIPPED["wall, 10 % loss"]
+        thrown = _THROW if self.place == "throw" else ()
+        return load_scenario(name, assignments=["theatre=false", *_GUARDS[self.guard], *thrown])
+
+    def measures(self, trace: Trace) -> Row:
+        """Tank, limits, energy."""
+        return {"place": self.place, "guard": self.guard, **guarded_measures(trace)}
 
 
 class TimedQpConfig(PassiveQpConfig):
@@ -228,6 +282,11 @@ def comparison(place: Place, delays_ms: tuple[int, ...] = (PAPER["round_trip"],)
     ]
 
 
+def guarded() -> list[Guarded]:
+    """Where the energy row acts: with it, with the valve, and with neither."""
+    return [Guarded(place, guard) for place, guard in product(get_args(Guardable), get_args(Guard))]
+
+
 def sweep() -> list[Push]:
     """The wall over the delay, clean and lossy."""
     lossy = [
@@ -237,35 +296,3 @@ def sweep() -> list[Push]:
         for seed in (LOSSY_SEEDS if (grip, delay) == ("light", PAPER["round_trip"]) else LOSSY_SEEDS[:1])
     ]
     return [*comparison("wall", DELAYS_MS), *lossy]
-
-
-_LINES: tuple[tuple[str, str, Cell], ...] = (
-    ("RCM error, RMS (mm)", "rcm_rms_mm", PAPER["rcm_rms"]),
-    ("RCM error, largest (mm)", "rcm_max_mm", None),
-    ("velocity error, aligned (mm/s)", "velocity_aligned_mm_per_s", PAPER["velocity_rms"]),
-    ("velocity error, not aligned (mm/s)", "velocity_unaligned_mm_per_s", PAPER["velocity_rms"]),
-    ("velocity error, all ticks (mm/s)", "velocity_all_ticks_mm_per_s", PAPER["velocity_rms"]),
-    ("lowest tank (J)", "tank_min_j", None),
-    ("largest slack (mm/s)", "slack_max_mm_per_s", None),
-    ("largest slack, nothing active (mm/s)", "slack_free_max_mm_per_s", None),
-    ("a plane acts (% of ticks)", "planes_percent", None),
-    ("times that a plane began to act", "plane_contacts", None),
-    ("tip past a plane (mm)", "plane_overshoot_mm", None),
-    ("command above the speed limit (% of ticks)", "speed_limit_percent", None),
-    ("speed limit of an axis (mm/s)", "tip_speed_limit_mm_per_s", None),
-    ("fastest tip along an axis (mm/s)", "tip_speed_max_mm_per_s", None),
-    ("the energy budget acts (% of ticks)", "passivity_percent", None),
-    ("the operator's tank limits the force (% of ticks)", "force_scaled_percent", None),
-    ("rings transferred", "rings_transferred", None),
-    ("rings dropped", "ring_drops", None),
-    ("unexplained energy (% of exchanged)", "energy_residual_percent", None),
-    ("duration (s)", "duration_s", None),
-)
-
-
-def beside_the_paper(scenarios: Sequence[Row]) -> list[Row]:
-    """One line for each figure: the paper's, then ours in every scenario."""
-    return [
-        {"figure": words, "paper": paper, **{str(row["scenario"]): row[column] for row in scenarios}}
-        for words, column, paper in _LINES
-    ]

@@ -183,9 +183,26 @@ def push_measures(trace: Trace, end_s: float, *, tanks: bool) -> Row:
     }
 
 
+def guarded_measures(trace: Trace) -> Row:
+    """What guards the remote tank, where it acts: what the tank and the limits make of it."""
+    found = compute_metrics(trace.active())
+    return {
+        "outcome": outcome(trace),
+        "duration_s": float(trace["t_s"][-1]),
+        "tank_min_j": _tank_min(trace),
+        "deficit_j": found["tank_deficit_j"],
+        "beyond_stock_j": found["delivered_excess_j"],
+        "acts_percent": 100.0 * float(np.nanmean(trace["passivity_active"])),
+        "switches": _switches(np.nan_to_num(trace["passivity_active"])),
+        "acceleration_ratio": found["acceleration_limit_ratio"],
+        "relaxed_ticks": found["relaxed_ticks"],
+        "contact_max_n": found["tip_force_max_n"],
+    }
+
+
 def _stock(trace: Trace) -> float:
     """Energy that the two tanks begin with [J]."""
-    return 2.0 * float(trace.meta.scenario["task"]["tanks"]["initial_j"])
+    return 2.0 * float(trace.meta.scenario["task"]["bilateral"]["tanks"]["initial_j"])
 
 
 def _tank_min(trace: Trace) -> float:

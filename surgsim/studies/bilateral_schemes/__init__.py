@@ -1,0 +1,100 @@
+"""Bilateral schemes compared: which is passive, at rest and transparent at which delay."""
+
+from surgsim.display import count
+from surgsim.studies.bilateral_schemes import page
+from surgsim.studies.bilateral_schemes.cases import DELAYS_MS, MADE_PASSIVE, PAPER, SCHEMES, Push, pushes
+from surgsim.studies.bilateral_schemes.measures import map_table, winners_table, worst_excess
+from surgsim.studies.study import Claim, Groups, Judged, Study, holds
+from surgsim.studies.tables import Tables, number, pick
+from surgsim.teleop.judgement import PASSIVE_J
+
+_PASSIVE_MJ = 1e3 * PASSIVE_J
+
+
+def cases_of(quick: bool) -> Groups:
+    """Every push, or a few short ones."""
+    if not quick:
+        return {"pushes": pushes()}
+    return {
+        "pushes": [
+            Push(scheme=scheme, grip="normal", delay_ms=100, loss=0.0, cut_s=4.0)
+            for scheme in ("passive convex, tank", "P+d", "waves")
+        ]
+    }
+
+
+def _listed(excesses: dict[str, float]) -> str:
+    return ", ".join(f"{scheme} {most:.3g} mJ" for scheme, most in excesses.items()) or "none"
+
+
+def _ours(tables: Tables) -> Judged:
+    found = worst_excess(tables["map"], SCHEME_OURS)
+    rows = pick(tables["map"], scheme=SCHEME_OURS)
+    moving = [row for row in rows if row["rests"] != row["seeds"]]
+    places = "; ".join(
+        f"{row['grip']} grip, {number(row, 'delay_ms'):g} ms, loss {row['loss']}" for row in moving
+    )
+    return holds(found <= _PASSIVE_MJ), (
+        f"at most {found:.3g} mJ beyond its stock in {count(len(rows), 'place')}; "
+        f"not at rest in {len(moving)}: {places or 'none'}"
+    )
+
+
+def _others(tables: Tables) -> Judged | None:
+    known = {str(row["scheme"]) for row in tables["map"]}
+    most = {name: worst_excess(tables["map"], name) for name in MADE_PASSIVE if name in known - {SCHEME_OURS}}
+    active = {name: found for name, found in most.items() if found > _PASSIVE_MJ}
+    return "holds" if not active else "depends" if len(active) < len(most) else "does not hold", (
+        f"{len(most) - len(active)} of {len(most)} never give more than 1 mJ beyond their stock; "
+        f"more: {_listed(active)}"
+    )
+
+
+def _without(tables: Tables) -> Judged | None:
+    known = {str(row["scheme"]) for row in tables["map"]}
+    names = [name for name in SCHEMES if name in known and name not in MADE_PASSIVE]
+    if not names:
+        return None
+    bad = {name: [row for row in pick(tables["map"], scheme=name) if not _good(row)] for name in names}
+    told = "; ".join(f"{name} in {count(len(rows), 'place')}" for name, rows in bad.items())
+    every = all(bad.values())
+    return "holds" if every else "depends" if any(bad.values()) else "does not hold", (
+        f"active or not at rest: {told}"
+    )
+
+
+def _good(row: dict[str, object]) -> bool:
+    return row["passive"] == row["rests"] == row["seeds"]
+
+
+def _everywhere(tables: Tables) -> Judged:
+    names = {str(row["scheme"]) for row in tables["map"]}
+    whole = [name for name in SCHEMES if name in names and all(map(_good, pick(tables["map"], scheme=name)))]
+    return (
+        "holds" if whole else "does not hold",
+        f"passive and at rest at every place: {', '.join(whole) or 'none'}",
+    )
+
+
+SCHEME_OURS = "passive convex, tank"
+STUDY = Study(
+    name="bilateral_schemes",
+    heading="Bilateral schemes over delay and loss",
+    introduction=page.INTRODUCTION,
+    quick_note="three schemes, short pushes through 100 ms, without figures",
+    paper=PAPER,
+    cases=cases_of,
+    tables={
+        "pushes": lambda results: results.rows("pushes"),
+        "map": lambda results: map_table(results.rows("pushes")),
+        "winners": lambda results: winners_table(map_table(results.rows("pushes"))),
+    },
+    claims=[
+        Claim("surgsim", "ours, with tanks and valve, gives no energy beyond its stock anywhere", _ours),
+        Claim("surgsim", "the other schemes that are to be passive are", _others),
+        Claim("surgsim", "a scheme with nothing to keep it passive fails somewhere", _without),
+        Claim("surgsim", f"some scheme is passive and rests from 0 to {DELAYS_MS[-1]} ms", _everywhere),
+    ],
+    sections=page.SECTIONS,
+    figures=page.FIGURES,
+)

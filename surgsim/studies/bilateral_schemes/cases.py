@@ -1,0 +1,159 @@
+"""One push on the wall by every bilateral scheme, over delay, loss and grip."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import product
+from typing import Literal
+
+import numpy as np
+
+from surgsim.metrics.accuracy import rms
+from surgsim.metrics.catalog import compute_metrics
+from surgsim.scenario.load import load_scenario
+from surgsim.scenario.schema import Scenario
+from surgsim.studies.measures import outcome
+from surgsim.studies.study import Paper, SimulatedCase
+from surgsim.studies.tables import Row
+from surgsim.teleop.judgement import PASSIVE_J, excess_j
+from surgsim.tick.arrays import Array
+from surgsim.trace.trace import Trace
+
+Grip = Literal["normal", "light"]
+
+PAPER = Paper(
+    title="Experimental Comparison Study of Control Architectures for Bilateral Teleoperators",
+    reference="Rodriguez-Seda, Lee, Spong, IEEE Trans. Robot. 25(6), 2009",
+    printed={},
+)
+
+SCHEMES: dict[str, str] = {
+    "passive convex, tank": "{type: passive_convex, passivity: tank}",
+    "passive convex, tdpa": "{type: passive_convex, passivity: tdpa}",
+    "passive convex, off": "{type: passive_convex, passivity: off}",
+    "position-position": "{type: position_position}",
+    "position-force": "{type: position_force}",
+    "four-channel": "{type: four_channel}",
+    "P+d": "{type: p_plus_d}",
+    "set-position": "{type: passive_set_position}",
+    "two-layer": "{type: two_layer}",
+    "waves": "{type: wave_variables}",
+    "time-domain": "{type: time_domain}",
+}
+"""What a scheme is called here, and `task.bilateral`."""
+MADE_PASSIVE = (
+    "passive convex, tank",
+    "passive convex, tdpa",
+    "P+d",
+    "set-position",
+    "two-layer",
+    "waves",
+    "time-domain",
+)
+"""Schemes with something that is to keep them passive."""
+DELAYS_MS = (0, 100, 300, 600, 1000)
+LOSSES = (0.0, 0.2)
+GRIPS: tuple[Grip, ...] = ("normal", "light")
+SEEDS = (0, 1, 2)
+
+PUSH_S, ROUND_TRIPS, WINDOW_S = 6.0, 4.0, 2.0
+REST_MM_PER_S, STEADY_N, STEADY_SHARE = 5.0, 0.5, 0.05
+"""A push rests: handle slower than this (RMS), and the force's deviation below this or this share of it."""
+_LIGHT = ("task.operator.stiffness_n_per_m=20.0", "task.operator.damping_ns_per_m=1.0")
+_ASIDE = "{position_m: [0.02, 0.65, -0.045], push: true, dwell_s: 0.1}"
+_DOWN = "{position_m: [0.0, 0.65, -0.075], push: true, dwell_s: 1000.0}"
+_LEAST_N = 0.1
+
+
+@dataclass(frozen=True, kw_only=True)
+class Push(SimulatedCase):
+    """The hand moves aside, then to 15 mm below the wall, and stays: once, without looking.
+
+    Attributes:
+        scheme: One of `SCHEMES`.
+        grip: How firmly the hand holds the handle.
+        delay_ms: Round trip; the operator expects it [ms].
+        loss: Share of packets lost, each way.
+        seed: Of operator and channels.
+        cut_s: Length of the run if not the whole push [s].
+    """
+
+    scheme: str
+    grip: Grip
+    delay_ms: int
+    loss: float
+    seed: int = 0
+    cut_s: float | None = None
+
+    @property
+    def label(self) -> str:
+        """In words."""
+        return f"{self.scheme}, {self.grip} grip, {self.delay_ms} ms, loss {self.loss:g}, seed {self.seed}"
+
+    @property
+    def duration_s(self) -> float:
+        """Length of the run [s]."""
+        return self.cut_s or round(PUSH_S + ROUND_TRIPS * self.delay_ms / 1000.0, 3)
+
+    def scenario(self) -> Scenario:
+        """The shipped wall with this push and this scheme."""
+        line = f"{{delay_s: {self.delay_ms / 2000.0}, jitter_s: 0.0, loss: {self.loss}}}"
+        return load_scenario(
+            "teleop_wall_panda",
+            seed=self.seed,
+            assignments=[
+                "theatre=false",
+                "plant.energy_ledger=false",
+                f"task.goals=[{_ASIDE}, {_DOWN}]",
+                f"task.bilateral={SCHEMES[self.scheme]}",
+                f"task.duration_s={self.duration_s}",
+                f"task.channel={line}",
+                *(_LIGHT if self.grip == "light" else ()),
+            ],
+        )
+
+    def measures(self, trace: Trace) -> Row:
+        """What it is, energy, whether it rests, and what the hand feels of the contact."""
+        names = ("scheme", "grip", "delay_ms", "loss", "seed")
+        return {**{name: getattr(self, name) for name in names}, **push_measures(trace.active())}
+
+
+def push_measures(trace: Trace) -> Row:
+    """Energy, rest and transparency of a push, over its last two seconds.
+
+    `mismatch` is how far the force on the hand, in the tip's scale, is from that on the tip, over the latter.
+    """
+    scale = float(trace.meta.scenario["task"]["mapping"]["scale"])
+    last = trace["t_s"] >= trace["t_s"][-1] - WINDOW_S
+    contact, felt = (_size(trace, name)[last] for name in ("tip_force", "master_force"))
+    speed = 1e3 * rms(_size(trace, "handle_velocity")[last])
+    force, deviation, found = float(contact.mean()), float(contact.std()), compute_metrics(trace)
+    steady = deviation <= max(STEADY_N, STEADY_SHARE * force)
+    excess = excess_j(trace)
+    return {
+        "outcome": outcome(trace),
+        "rests": float(outcome(trace) == "completed" and speed <= REST_MM_PER_S and steady),
+        "passive": float(excess <= PASSIVE_J),
+        "excess_j": excess,
+        "handle_speed_mm_per_s": speed,
+        "contact_force_n": force,
+        "contact_deviation_n": deviation,
+        "contact_max_n": found["tip_force_max_n"],
+        "hand_force_n": float(felt.mean()),
+        "mismatch": abs(float(felt.mean()) / scale - force) / force if force > _LEAST_N else None,
+        "stiffness_n_per_m": found["transmitted_stiffness_n_per_m"],
+        "drift_mm": found["drift_end_mm"],
+        "rcm_max_mm": found["rcm_error_max_mm"],
+    }
+
+
+def _size(trace: Trace, block: str) -> Array:
+    """Length of a vector at every tick (rows,)."""
+    return np.asarray(np.linalg.norm(trace.block(block), axis=1))
+
+
+def pushes() -> Sequence[Push]:
+    """Every cell of the map, with every seed."""
+    return [
+        Push(scheme=scheme, grip=grip, delay_ms=delay, loss=loss, seed=seed)
+        for scheme, grip, delay, loss, seed in product(SCHEMES, GRIPS, DELAYS_MS, LOSSES, SEEDS)
+    ]

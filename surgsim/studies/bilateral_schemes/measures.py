@@ -1,0 +1,77 @@
+"""The map: a row for each scheme and place, with its interval; and who is best where."""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.stats import t as student
+
+from surgsim.studies.tables import Row, groups, number, numbers, pick
+
+CONFIDENCE = 0.95
+
+
+def interval(values: Sequence[float]) -> tuple[float, float, float]:
+    """Mean and the ends of its 95 % interval, of Student's distribution; infinite of one value alone."""
+    found = np.array(values, dtype=float)
+    mean = float(found.mean())
+    if found.size < 2:
+        return mean, -math.inf, math.inf
+    half = student.ppf(0.5 + CONFIDENCE / 2.0, found.size - 1) * found.std(ddof=1) / math.sqrt(found.size)
+    return mean, mean - float(half), mean + float(half)
+
+
+def map_table(pushes: Sequence[Row]) -> list[Row]:
+    """A row for each place and scheme: in how many seeds it is passive and rests, and its mismatch."""
+    keys = ("grip", "loss", "delay_ms", "scheme")
+    table: list[Row] = []
+    for key, rows in groups(pushes, *keys).items():
+        felt = [number(row, "mismatch") for row in rows if row["mismatch"] is not None]
+        mean, low, high = interval(felt) if len(felt) == len(rows) else (math.nan, math.nan, math.nan)
+        table.append(
+            {
+                **dict(zip(keys, key, strict=True)),
+                "seeds": len(rows),
+                "passive": round(sum(numbers(rows, "passive"))),
+                "rests": round(sum(numbers(rows, "rests"))),
+                "excess_max_mj": 1e3 * max(numbers(rows, "excess_j")),
+                "contact_force_n": float(np.mean(numbers(rows, "contact_force_n"))),
+                "mismatch": None if math.isnan(mean) else mean,
+                "mismatch_low": None if math.isnan(mean) else low,
+                "mismatch_high": None if math.isnan(mean) else high,
+                "drift_mm": float(np.mean(numbers(rows, "drift_mm"))),
+            }
+        )
+    return table
+
+
+def qualified(rows: Sequence[Row]) -> list[Row]:
+    """Schemes that are passive and rest with every seed, and press; most transparent first."""
+    good = [
+        row for row in rows if row["passive"] == row["rests"] == row["seeds"] and row["mismatch"] is not None
+    ]
+    return sorted(good, key=lambda row: number(row, "mismatch"))
+
+
+def winners_table(table: Sequence[Row]) -> list[Row]:
+    """Who is best at each place: the smallest mismatch of those that qualify, and who is not told from it."""
+    found: list[Row] = []
+    for (grip, loss, delay), rows in groups(table, "grip", "loss", "delay_ms").items():
+        good = qualified(rows)
+        row: Row = {"grip": grip, "loss": loss, "delay_ms": delay, "qualified": len(good), "best": "none"}
+        row |= {"mismatch": None, "mismatch_low": None, "mismatch_high": None, "not_told_apart": ""}
+        if good:
+            best, others = good[0], good[1:]
+            near = [
+                other for other in others if number(other, "mismatch_low") <= number(best, "mismatch_high")
+            ]
+            row["best"] = best["scheme"]
+            row |= {key: best[key] for key in ("mismatch", "mismatch_low", "mismatch_high")}
+            row["not_told_apart"] = ", ".join(str(other["scheme"]) for other in near)
+        found.append(row)
+    return found
+
+
+def worst_excess(table: Sequence[Row], scheme: str) -> float:
+    """Largest energy of a scheme beyond its stock, over all places [mJ]."""
+    return max(numbers(pick(table, scheme=scheme), "excess_max_mj"))
