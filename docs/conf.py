@@ -27,6 +27,7 @@ include_patterns = [
     "docs/reference/*.md",
     "docs/tutorial/*.py",
     "results/*/README.md",
+    "examples/container/README.md",
     "examples/external/*/README.md",
     "benchmarks/README.md",
     "CONTRIBUTING.md",
@@ -48,6 +49,7 @@ exclude_patterns = [
 pages_below = {
     "docs/controllers/README": "[a-z]*",
     "docs/external_controllers": "../examples/external/*/README",
+    "docs/submission": "../examples/container/README",
 }
 
 extensions = [
