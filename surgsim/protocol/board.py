@@ -91,7 +91,7 @@ def make_board(
 
 
 def _write_passports(board: Board, found: dict[Path, Score]) -> None:
-    """Each passport beside the baselines of its track."""
+    """Each passport beside the baselines of its track; no picture, which is half a megabyte each."""
     for folder, made in found.items():
         beside = baselines_of(made, found.values(), board.protocol)
-        write_passport(folder, made, beside, board.protocol.config)
+        write_passport(folder, made, beside, board.protocol.config, drawn=(".pdf",))

@@ -15,7 +15,9 @@ from surgsim.runs.sources import ROOT, hash_of
 from surgsim.scenario.load import load_controller
 
 PROBE = "0" * 64
-"""Key of the seed with which scenarios are made that stand for all of a generator."""
+"""Key of the seeds with which scenarios are made that stand for all of a generator."""
+DRAWS = 12
+"""Seeds of a drawn generator that stand for all: every kind of path is among them."""
 _CODE = (
     "metrics",
     "verdict.py",
@@ -65,13 +67,13 @@ def protocol_sha256(items: Items) -> str:
 
 
 def _scenarios(protocol: Protocol, generator: str, arm: str) -> str:
-    """Hash of complete scenarios, every default in them, at every level: for a seed that stands for all."""
-    seeds = Seeds(kind="probe", key=PROBE)
+    """Hash of complete scenarios, every default in them, at every level: for seeds that stand for all."""
+    seeds, most = Seeds(kind="probe", key=PROBE), DRAWS if protocol.config.generators[generator].drawn else 1
     hashes: dict[str, Any] = {}
     try:
-        for cell in cells_of(protocol, generator, arm, seeds, reference(), most_seeds=1):
+        for cell in cells_of(protocol, generator, arm, seeds, reference(), most_seeds=most):
             if cell.scenario is not None:
-                hashes[f"{cell.axis}={cell.level}"] = cell.scenario.sha256()
+                hashes[cell.id] = cell.scenario.sha256()
     except ScenarioError as error:
         raise SurgsimError(f"{protocol.path}: generator {generator}, arm {arm}: {error}") from error
     return sha256_of(hashes)

@@ -15,8 +15,21 @@ from surgsim.recording.folders import make_folder
 _DOTS_PER_INCH = 220
 
 
-def write_passport(folder: Path, score: Score, others: Sequence[Score], protocol: ProtocolConfig) -> None:
-    """Write `passport.pdf`, `passport.png` and `passport.html` into a score's folder.
+def write_passport(
+    folder: Path,
+    score: Score,
+    others: Sequence[Score],
+    protocol: ProtocolConfig,
+    drawn: Sequence[str] = (".pdf", ".png"),
+) -> None:
+    """Write `passport.html`, and the chart as `passport.pdf` and `passport.png`, into a score's folder.
+
+    Args:
+        folder: The folder.
+        score: The score.
+        others: Scores beside it.
+        protocol: Their protocol.
+        drawn: Suffixes of the files of the chart.
 
     Raises:
         SurgsimError: If the disk refuses.
@@ -24,8 +37,7 @@ def write_passport(folder: Path, score: Score, others: Sequence[Score], protocol
     with journal_style():
         figure = passport_figure(score, others, protocol)
         contents: dict[str, bytes | str] = {
-            suffix: figure_bytes(figure, Path(f"passport{suffix}"), _DOTS_PER_INCH)
-            for suffix in (".pdf", ".png")
+            suffix: figure_bytes(figure, Path(f"passport{suffix}"), _DOTS_PER_INCH) for suffix in drawn
         }
     contents[".html"] = passport_page(score, others, protocol)
     try:

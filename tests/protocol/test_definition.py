@@ -5,7 +5,8 @@ from tiny_protocol import TINY, write_protocol
 
 from surgsim.control.external.given import giving
 from surgsim.errors import ScenarioError, SurgsimError
-from surgsim.protocol.cells import cells
+from surgsim.protocol import items
+from surgsim.protocol.cells import cells, scenario_tree
 from surgsim.protocol.definition import entry_file, entry_scheme, load_protocol, merged
 from surgsim.protocol.entrants import ANY, entrant, refusal, track_for
 from surgsim.protocol.seeds import Seeds
@@ -164,3 +165,9 @@ def test_merged_replaces_all_but_mappings():
         "a": {"b": 1, "c": [3]},
         "d": {"e": 2},
     }
+
+
+def test_every_kind_of_drawn_path_is_among_those_that_are_hashed():
+    seeds = Seeds(kind="probe", key=items.PROBE).of("random", items.DRAWS)
+    trees = [scenario_tree(SHIPPED, "random", "panda", seed) for seed in seeds]
+    assert {tree["task"]["type"] for tree in trees} == {"circle", "sinusoid", "spiral"}

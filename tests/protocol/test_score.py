@@ -249,3 +249,11 @@ def test_the_passport_is_written_beside_the_score(warm, whole, tmp_path):
     assert "1 of 4 runs failed" in done.stdout
     assert {name for name in PASSPORT if (tmp_path / "a" / name).stat().st_size > 1000} == set(PASSPORT)
     assert read_score(tmp_path / "a").content["scorecard_sha256"] == made.content["scorecard_sha256"]
+
+
+def test_a_program_outside_is_scored_and_told_by_what_it_declares(scored):
+    made = scored("external_torque")
+    told = made.content["controller"]
+    assert set(told["externals"]) == {"mine"}
+    assert told["externals"]["mine"]["version"]
+    assert all(row.outcome in ("completed", "velocity_limit", "patient_collision") for row in made.rows)
