@@ -27,7 +27,11 @@ include_patterns = [
     "docs/reference/*.md",
     "docs/tutorial/*.py",
     "results/*/README.md",
+<<<<<<< HEAD
     "examples/README.md",
+=======
+    "examples/container/README.md",
+>>>>>>> bundle
     "examples/external/*/README.md",
     "benchmarks/README.md",
     "CONTRIBUTING.md",
@@ -49,6 +53,7 @@ exclude_patterns = [
 pages_below = {
     "docs/controllers/README": "[a-z]*",
     "docs/external_controllers": "../examples/external/*/README",
+    "docs/submission": "../examples/container/README",
 }
 
 extensions = [

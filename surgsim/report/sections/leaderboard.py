@@ -30,10 +30,10 @@ def leaderboard_section(results: Results, boards: Boards) -> str:
         return html.section("leaderboard", "Leaderboard", html.paragraph("No run completed."))
     main = results.headline[0]
     note = (
-        f"Places and ranks are by {METRICS[main].heading}; controllers that are not told apart share a "
-        "place. Figures are interquartile means over completed runs with 95 % intervals below; failures "
-        "are in no mean. Bold: the best of those that never failed, and what is not worse by what "
-        "matters. Press a heading to sort, again to reverse."
+        f"Places and ranks are by {METRICS[main].heading}; in places, who fails more comes after, and "
+        "controllers that are not told apart share one. Figures are interquartile means over completed runs "
+        "with 95 % intervals below; failures are in no mean. Bold: the best of those that never failed, and "
+        "what is not worse by what matters. Press a heading to sort, again to reverse."
     )
     points = len(set(results.runs.parameters.tolist()))
     if points > 1:
