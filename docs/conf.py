@@ -27,11 +27,8 @@ include_patterns = [
     "docs/reference/*.md",
     "docs/tutorial/*.py",
     "results/*/README.md",
-<<<<<<< HEAD
     "examples/README.md",
-=======
     "examples/container/README.md",
->>>>>>> bundle
     "examples/external/*/README.md",
     "benchmarks/README.md",
     "CONTRIBUTING.md",
