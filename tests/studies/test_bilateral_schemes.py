@@ -3,6 +3,7 @@
 import json
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -103,3 +104,17 @@ def test_quick_through_the_command(tmp_path):
     assert [line["scheme"] for line in found] == ["passive convex, tank", "P+d", "waves"]
     assert all(line["passive"] == 1.0 and line["contact_force_n"] > 0.5 for line in found)
     assert load_study("bilateral_schemes") is STUDY
+
+
+RESULTS = Path(__file__).resolve().parents[2] / "results" / "bilateral_schemes"
+
+
+def test_the_committed_page_is_that_of_the_committed_pushes(read_numbers):
+    committed = {name: read_numbers(RESULTS / f"{name}.csv") for name in ("pushes", "map", "winners")}
+    assert len(committed["pushes"]) == len(pushes())
+    page = (RESULTS / "README.md").read_text()
+    for claim in STUDY.judge({**committed, "map": map_table(committed["pushes"])}):
+        assert f"| {claim.text} | {claim.source} | **{claim.verdict}** |" in page
+    again = winners_table(map_table(committed["pushes"]))
+    assert [line["best"] for line in again] == [line["best"] for line in committed["winners"]]
+    assert sorted(path.name for path in RESULTS.glob("*.png")) == ["stability.png", "transparency.png"]

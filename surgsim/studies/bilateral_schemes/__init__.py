@@ -5,7 +5,7 @@ from surgsim.studies.bilateral_schemes import page
 from surgsim.studies.bilateral_schemes.cases import DELAYS_MS, MADE_PASSIVE, PAPER, SCHEMES, Push, pushes
 from surgsim.studies.bilateral_schemes.measures import map_table, winners_table, worst_excess
 from surgsim.studies.study import Claim, Groups, Judged, Study, holds
-from surgsim.studies.tables import Tables, number, pick
+from surgsim.studies.tables import Row, Tables, number, pick
 from surgsim.teleop.judgement import PASSIVE_J
 
 _PASSIVE_MJ = 1e3 * PASSIVE_J
@@ -63,7 +63,7 @@ def _without(tables: Tables) -> Judged | None:
     )
 
 
-def _good(row: dict[str, object]) -> bool:
+def _good(row: Row) -> bool:
     return row["passive"] == row["rests"] == row["seeds"]
 
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.stats import t as student
 
-from surgsim.studies.tables import Row, groups, number, numbers, pick
+from surgsim.studies.tables import Cell, Row, groups, number, numbers, pick
 
 CONFIDENCE = 0.95
 
@@ -58,7 +58,13 @@ def winners_table(table: Sequence[Row]) -> list[Row]:
     found: list[Row] = []
     for (grip, loss, delay), rows in groups(table, "grip", "loss", "delay_ms").items():
         good = qualified(rows)
-        row: Row = {"grip": grip, "loss": loss, "delay_ms": delay, "qualified": len(good), "best": "none"}
+        row: dict[str, Cell] = {
+            "grip": grip,
+            "loss": loss,
+            "delay_ms": delay,
+            "qualified": len(good),
+            "best": "none",
+        }
         row |= {"mismatch": None, "mismatch_low": None, "mismatch_high": None, "not_told_apart": ""}
         if good:
             best, others = good[0], good[1:]

@@ -4,7 +4,7 @@ from surgsim.studies.bilateral_schemes.cases import DELAYS_MS, GRIPS, LOSSES, SC
 from surgsim.studies.bilateral_schemes.measures import qualified
 from surgsim.studies.figure import BLACK, BLUE, GREEN, ORANGE, PURPLE, VERMILLION, Axes, label
 from surgsim.studies.study import Figure, Results, Section
-from surgsim.studies.tables import Tables, number, pick
+from surgsim.studies.tables import Row, Tables, number, pick
 
 _COLOURS = {"both": GREEN, "passive": BLUE, "rests": ORANGE, "neither": VERMILLION}
 _WORDS = {
@@ -16,7 +16,7 @@ _WORDS = {
 _LINES = (BLACK, BLUE, GREEN, ORANGE, PURPLE, VERMILLION)
 
 
-def _kind(row: dict[str, object]) -> str:
+def _kind(row: Row) -> str:
     """What a place of the map is, by its worst seed."""
     passive, rests = row["passive"] == row["seeds"], row["rests"] == row["seeds"]
     return "both" if passive and rests else "passive" if passive else "rests" if rests else "neither"
