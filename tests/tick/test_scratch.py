@@ -2,13 +2,15 @@
 
 import ast
 from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 import pytest
 
 import surgsim
 from surgsim.compiled import compiled
-from surgsim.tick.arrays import MOST_JOINTS
+from surgsim.tick.arrays import MOST_JOINTS, Array, Record
+from surgsim.tick.overlay import overlay
 from surgsim.tick.scratch import scratch, scratch_matrix
 
 NAMES = {"scratch", "scratch_matrix"}
@@ -74,3 +76,29 @@ def test_more_than_there_is_room_for_is_refused(size):
         with pytest.raises(ValueError, match="at most"):
             form(*size)
     assert _first(40, 9) == 121
+
+
+class Kept(Record):
+    """A record with an array, as laws lay it over their memory."""
+
+    SHAPES: ClassVar[dict[str, str]] = {"v": "3"}
+    a: float
+    v: Array
+
+
+KEPT, KEPT_SIZE = overlay(Kept)
+
+
+def keep(memory, x):
+    kept, s = memory[:KEPT_SIZE].view(KEPT)[0], scratch(3)
+    s[0] = x
+    for i in range(3):
+        kept.v[i] = x + i
+    kept.a = s[0]
+
+
+def test_a_kernel_with_scratch_keeps_what_it_writes_to_a_record_over_an_array():
+    fast, slow = np.zeros(KEPT_SIZE), np.zeros(KEPT_SIZE)
+    compiled(keep)(fast, 2.0)
+    keep(slow, 2.0)
+    assert fast.tolist() == slow.tolist() == [2.0, 2.0, 3.0, 4.0]
