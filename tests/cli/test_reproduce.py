@@ -128,5 +128,5 @@ def test_an_unknown_study_is_one_line(small, capsys):
     assert main(["reproduce", "manipulability"]) == 2
     out, error = capsys.readouterr()
     assert out == ""
-    assert error.startswith("surgsim: 'manipulability' is not a study. Known: manipulability_validation, ")
+    assert error.startswith("surgsim: 'manipulability' is not a study. Known: bilateral_schemes, ")
     assert error.count("\n") == 1

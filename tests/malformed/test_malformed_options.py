@@ -112,8 +112,8 @@ OPTIONS = {
     "inspect . --run x": "holds no runs.parquet",
     "inspect scenario.yaml": "scenario.yaml: is not a rerun recording",
     "reproduce vprn": (
-        "'vprn' is not a study. Known: manipulability_validation, passive_teleoperation, vprnn. "
-        "Did you mean 'vprnn'?"
+        "'vprn' is not a study. Known: bilateral_schemes, manipulability_validation, passive_teleoperation, "
+        "vprnn. Did you mean 'vprnn'?"
     ),
     f"reproduce {LONG}": "is not a study",
     "reproduce vprnn --out scenario.yaml": "scenario.yaml is a file; --out names a folder",
