@@ -8,6 +8,9 @@ import difflib
 import enum
 from collections.abc import Iterable
 
+_ROOM = 800
+"""Characters of a list of names that a person still reads."""
+
 
 class SurgsimError(Exception):
     """Something that the user can mend: bad input, a file that is damaged, a path out of reach.
@@ -64,9 +67,18 @@ def unknown_name(name: str, kind: str, known: Iterable[str]) -> str:
     """Say that `name` is not a `kind`, list what is, and suggest the nearest match."""
     names = sorted(known)
     shown = name if len(name) <= 60 else f"{name[:57]}..."
-    text = f"'{shown}' is not a {kind}. Known: {', '.join(names) or 'none'}."
+    text = f"'{shown}' is not a {kind}. Known: {_listed(names) or 'none'}."
     near = difflib.get_close_matches(shown, names, n=1)
     return f"{text} Did you mean '{near[0]}'?" if near else text
+
+
+def _listed(names: list[str]) -> str:
+    """The names in one line, and how many more there are where a line has no room for them."""
+    text = ", ".join(names)
+    if len(text) <= _ROOM:
+        return text
+    head = text[:_ROOM].rpartition(", ")[0]
+    return f"{head} and {len(names) - head.count(',') - 1} more"
 
 
 def told(error: BaseException) -> str:

@@ -40,7 +40,7 @@ COMMANDS = (
     "test-part",
     "completion",
 )
-_LONGEST_ERROR = 2000
+_LONGEST_ERROR = 1000
 _EPILOG = """examples:
   surgsim run circle_lwr4plus          run a shipped scenario
   surgsim run my.yaml --set task.radius_m=0.03
