@@ -105,7 +105,7 @@ WRONG = {
     "unknown scenario": (["run", "circel_lwr4plus"], "'circel_lwr4plus' is not a shipped scenario. Known: "),
     "unknown safety scenario": (
         ["run", "safety/tip_limt"],
-        "'safety/tip_limt' is not a shipped scenario. Known: safety/diverged, ",
+        "'safety/tip_limt' is not a shipped scenario. Known: safety/arm_collision, ",
     ),
     "unknown controller": (
         ["run", "circle_lwr4plus", "--controller", "vprn"],
@@ -166,7 +166,7 @@ def test_a_wrong_command_exits_2_with_the_usage(capsys, words):
 
 MISTYPED = {
     "command": (["rnu"], "'rnu' is not a command. Known: adopt, bench, check, "),
-    "kind": (["list", "controler"], "'controler' is not a kind. Known: controllers, "),
+    "kind": (["list", "controler"], "'controler' is not a kind. Known: bilateral, "),
     "option": (
         ["run", "circle_lwr4plus", "--contrller", "qp"],
         "'--contrller' is not an option of surgsim run.",

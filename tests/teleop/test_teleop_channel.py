@@ -46,6 +46,7 @@ class Link:
         self.law, self.channel = new(ChannelLaw, 0), new(Channel, 0)
         self.end, self.got = new(ReceiverLaw, 0), new(Receiver, 0)
         take(self.law, config)
+        self.law.clock_rate = 1.0
         take(self.end, receiver or ReceiverConfig())
         window = window or most
         self.law.capacity, self.law.draws, self.law.ring = 2 * most, window, window + DRAW * most

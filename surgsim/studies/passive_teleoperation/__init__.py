@@ -24,8 +24,7 @@ SUB_MILLIMETRE_MM, OVERSHOOT_MM = 1.0, 0.1
 SPEED_MARGIN = 1.02
 """Of the tip's measured speed over its limit."""
 ENERGY_TOLERANCE_J, ACTIVE_J, RESIDUAL_PERCENT, QP_LIMIT_US = 1e-6, 1e-3, 1.0, 200.0
-DRIFT_MM = 0.01
-"""A difference of offsets that counts."""
+DRIFT_MM = 0.01  # a difference of offsets that counts
 _RCM_MM, _VELOCITY_MM_PER_S, _ROUND_TRIP_MS = (
     PAPER[name] for name in ("rcm_rms", "velocity_rms", "round_trip")
 )
