@@ -75,7 +75,5 @@ def test_the_page_names_every_example():
     names = {path.name for path in EXAMPLES.glob("*.py")} | {
         f"{path.name}/" for path in EXAMPLES.iterdir() if path.is_dir()
     }
-    named = {
-        name.removesuffix("README.md") for name in re.findall(r"^\| \[[^]]+\]\(([^)]+)\)", page, re.MULTILINE)
-    }
+    named = set(re.findall(r"^\| \[([^]]+)\]", page, re.MULTILINE))
     assert named == {name for name in names if not name.startswith("__")}

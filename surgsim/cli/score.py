@@ -21,9 +21,9 @@ given by --external. Every finished run is kept in the store by the hash of all 
 never run again while that is the same: what was interrupted goes on by the same command.
 
 examples:
-  surgsim score rcm_inverse_dynamics --arms panda
-  surgsim score my.yaml --track nominal --arms panda,fr3 --jobs 4
-  surgsim score --external mine='python my_controller.py' --arms panda
+  surgsim score rcm_inverse_dynamics
+  surgsim score my.yaml --track nominal --jobs 4
+  surgsim score --external mine='python my_controller.py'
   surgsim score my.yaml --seeds 2027-1 --out scores/mine
   surgsim score my.yaml --store /shared/store --shard 3/8    one of eight array jobs
   surgsim score --all --out results/surgsim_v1               the leaderboard

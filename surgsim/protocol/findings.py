@@ -23,7 +23,7 @@ class Finding:
 
     @property
     def line(self) -> str:
-        """For a person: `cell random/panda/base/3: seed: 4 in the bundle, 3 here`."""
+        """For a person: `cell random/ARM/base/3: seed: 4 in the bundle, 3 here`."""
         return f"{self.where}: {self.what}: {self.bundle} in the bundle, {self.here} here"
 
 
