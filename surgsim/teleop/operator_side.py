@@ -5,7 +5,7 @@ from typing import ClassVar
 from surgsim.columns import scalar, vector
 from surgsim.compiled import compiled
 from surgsim.teleop.bilateral.base import End
-from surgsim.teleop.bilateral.ends import CalledScheme, feel, see, tell
+from surgsim.teleop.bilateral.ends import CalledScheme, ask, see
 from surgsim.teleop.channel import Channel, ChannelLaw
 from surgsim.teleop.console import ConsoleLaw, ConsoleMemory, renderable, step_console
 from surgsim.teleop.mapping import (
@@ -212,7 +212,7 @@ def _feel(law: OperatorSideLaw, gains: Array, side: OperatorSide, memory: Array,
     see(law.receiver, side.receiver, end, side.t_s, law.period_s, received_j)
     end.mobility_per_kg = mapping.scale * mapping.scale / law.console.least_mass_kg
     _place_end(law, side)
-    status = feel(law.scheme, gains, end, memory)
+    status = ask(law.scheme.feel, law.scheme, gains, end, memory)
     force_to_console(mapping, end.command, side.desired)
     renderable(law.console, side.console, side.desired)
     for i in range(3):
@@ -225,7 +225,7 @@ def _tell(law: OperatorSideLaw, gains: Array, side: OperatorSide, memory: Array,
     """The message of the bilateral scheme."""
     _place_end(law, side)
     side.end.work_j = rendered_j
-    status = tell(law.scheme, gains, side.end, memory)
+    status = ask(law.scheme.tell, law.scheme, gains, side.end, memory)
     side.content[:] = side.end.content
     return status
 

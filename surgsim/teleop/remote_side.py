@@ -6,7 +6,7 @@ from typing import ClassVar
 from surgsim.columns import scalar, vector
 from surgsim.compiled import compiled
 from surgsim.teleop.bilateral.base import End
-from surgsim.teleop.bilateral.ends import CalledScheme, follow, see
+from surgsim.teleop.bilateral.ends import CalledScheme, ask, see
 from surgsim.teleop.channel import Channel, ChannelLaw
 from surgsim.teleop.messages import JAW, OFF, POSITION, SCHEME, TDPA, VELOCITY
 from surgsim.teleop.passivity_control import (
@@ -187,7 +187,7 @@ def _follow(
     end.work_j = work_j
     for i in range(3):
         end.position[i], end.velocity[i], end.force[i] = position[i], velocity[i], side.force[i]
-    status = follow(law.scheme, gains, end, memory)
+    status = ask(law.scheme.follow, law.scheme, gains, end, memory)
     for i in range(3):
         side.velocity[i] = end.command[i]
     return status

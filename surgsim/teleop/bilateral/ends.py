@@ -45,32 +45,10 @@ def see(
 
 
 @compiled
-def feel(called: CalledScheme, gains: Array, end: End, memory: Array) -> int:
-    """The scheme's force on the handle; a status."""
+def ask(kernel: int, called: CalledScheme, gains: Array, end: End, memory: Array) -> int:
+    """Call the scheme's kernel at that address, with its numbers and the memory of this end; a status."""
     numbers = gains[called.gains : called.gains + called.gain_count]
-    status: int = call_at(
-        called.feel, numbers, end, memory[called.memory : called.memory + called.memory_size]
-    )
-    return status
-
-
-@compiled
-def tell(called: CalledScheme, gains: Array, end: End, memory: Array) -> int:
-    """The scheme's message from the operator; a status."""
-    numbers = gains[called.gains : called.gains + called.gain_count]
-    status: int = call_at(
-        called.tell, numbers, end, memory[called.memory : called.memory + called.memory_size]
-    )
-    return status
-
-
-@compiled
-def follow(called: CalledScheme, gains: Array, end: End, memory: Array) -> int:
-    """The scheme's velocity of the tip, and its message from there; a status."""
-    numbers = gains[called.gains : called.gains + called.gain_count]
-    status: int = call_at(
-        called.follow, numbers, end, memory[called.memory : called.memory + called.memory_size]
-    )
+    status: int = call_at(kernel, numbers, end, memory[called.memory : called.memory + called.memory_size])
     return status
 
 

@@ -9,6 +9,7 @@ from surgsim.compiled import compiled
 from surgsim.teleop.bilateral.base import End
 from surgsim.teleop.messages import FORCE, POSITION, VELOCITY
 from surgsim.tick.arrays import Array, Record
+from surgsim.tick.status import GOES_ON
 
 
 class FollowerConfig(PartConfig):
@@ -77,3 +78,10 @@ def tell_motion(end: End) -> None:
         end.content[VELOCITY + i] = end.velocity[i]
         end.content[FORCE + i] = end.force[i]
     end.energy_j = 0.0
+
+
+@compiled
+def tell(gains: Array, end: End, memory: Array) -> int:
+    """The message of schemes that send no energy: position, velocity and force of the handle."""
+    tell_motion(end)
+    return GOES_ON

@@ -2,7 +2,6 @@
 
 from typing import Literal
 
-import numpy as np
 from pydantic import NonNegativeFloat
 
 from surgsim.catalog import PartConfig
@@ -14,11 +13,13 @@ from surgsim.teleop.bilateral.follower import (
     FollowerLaw,
     couple,
     drive,
+    tell,
     tell_motion,
 )
 from surgsim.teleop.messages import FORCE
 from surgsim.tick.arrays import Array, Record
 from surgsim.tick.overlay import overlay
+from surgsim.tick.scratch import scratch
 from surgsim.tick.status import GOES_ON
 
 
@@ -83,17 +84,10 @@ def feel(gains: Array, end: End, memory: Array) -> int:
 
 
 @compiled
-def tell(gains: Array, end: End, memory: Array) -> int:
-    """Position and velocity of the handle, and the hand's force on it."""
-    tell_motion(end)
-    return GOES_ON
-
-
-@compiled
 def follow(gains: Array, end: End, memory: Array) -> int:
     """f_s = C (x_m(t - T1) - x_s) + C3 f_h(t - T1), on the follower."""
     law, follower = gains[:LAW_SIZE].view(LAW)[0], memory[:MEMORY_SIZE].view(MEMORY)[0]
-    force = np.empty(3)
+    force = scratch(3)
     couple(end, law.stiffness_n_per_m, law.damping_ns_per_m, force)
     _add_force(end, law.hand_gain, force)
     drive(law.follower, follower, end, force)

@@ -2,7 +2,6 @@
 
 from typing import Literal
 
-import numpy as np
 from pydantic import NonNegativeFloat, PositiveFloat
 
 from surgsim.catalog import PartConfig
@@ -14,10 +13,12 @@ from surgsim.teleop.bilateral.follower import (
     FollowerLaw,
     couple,
     drive,
+    tell,
     tell_motion,
 )
 from surgsim.tick.arrays import Array, Record
 from surgsim.tick.overlay import overlay
+from surgsim.tick.scratch import scratch
 from surgsim.tick.status import GOES_ON
 
 
@@ -92,17 +93,10 @@ def feel(gains: Array, end: End, memory: Array) -> int:
 
 
 @compiled
-def tell(gains: Array, end: End, memory: Array) -> int:
-    """Position of the handle; its velocity is sent and not used."""
-    tell_motion(end)
-    return GOES_ON
-
-
-@compiled
 def follow(gains: Array, end: End, memory: Array) -> int:
     """f_s = K (x_m(t - T1) - x_s) - B_s v_s, on the follower."""
     law, follower = gains[:LAW_SIZE].view(LAW)[0], memory[:MEMORY_SIZE].view(MEMORY)[0]
-    force = np.empty(3)
+    force = scratch(3)
     _pull(gains, end, force)
     drive(law.follower, follower, end, force)
     tell_motion(end)

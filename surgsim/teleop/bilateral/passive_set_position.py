@@ -3,7 +3,6 @@
 import math
 from typing import ClassVar, Literal
 
-import numpy as np
 from pydantic import NonNegativeFloat, PositiveFloat
 
 from surgsim.catalog import PartConfig
@@ -19,6 +18,7 @@ from surgsim.teleop.bilateral.follower import (
 from surgsim.teleop.messages import POSITION
 from surgsim.tick.arrays import Array, Record
 from surgsim.tick.overlay import overlay
+from surgsim.tick.scratch import scratch
 from surgsim.tick.status import GOES_ON
 
 
@@ -151,7 +151,7 @@ def tell(gains: Array, end: End, memory: Array) -> int:
 def follow(gains: Array, end: End, memory: Array) -> int:
     """f_s = K (x* - x_s) - B v_s, see `modulate`, on the follower."""
     law, known = gains[:LAW_SIZE].view(LAW)[0], memory[:MEMORY_SIZE].view(MEMORY)[0]
-    force = np.empty(3)
+    force = scratch(3)
     modulate(law, known, end, force)
     drive(law.follower, known.follower, end, force)
     tell_motion(end)

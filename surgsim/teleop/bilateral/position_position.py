@@ -2,7 +2,6 @@
 
 from typing import Literal
 
-import numpy as np
 from pydantic import NonNegativeFloat
 
 from surgsim.catalog import PartConfig
@@ -14,10 +13,12 @@ from surgsim.teleop.bilateral.follower import (
     FollowerLaw,
     couple,
     drive,
+    tell,
     tell_motion,
 )
 from surgsim.tick.arrays import Array, Record
 from surgsim.tick.overlay import overlay
+from surgsim.tick.scratch import scratch
 from surgsim.tick.status import GOES_ON
 
 
@@ -66,17 +67,10 @@ def feel(gains: Array, end: End, memory: Array) -> int:
 
 
 @compiled
-def tell(gains: Array, end: End, memory: Array) -> int:
-    """Position and velocity of the handle."""
-    tell_motion(end)
-    return GOES_ON
-
-
-@compiled
 def follow(gains: Array, end: End, memory: Array) -> int:
     """f_s = K (x_m(t - T1) - x_s) + B (v_m(t - T1) - v_s), on the follower."""
     law, follower = gains[:LAW_SIZE].view(LAW)[0], memory[:MEMORY_SIZE].view(MEMORY)[0]
-    force = np.empty(3)
+    force = scratch(3)
     couple(end, law.stiffness_n_per_m, law.damping_ns_per_m, force)
     drive(law.follower, follower, end, force)
     tell_motion(end)

@@ -2,13 +2,12 @@
 
 from typing import ClassVar, Literal
 
-import numpy as np
 from pydantic import NonNegativeFloat, PositiveFloat
 
 from surgsim.catalog import PartConfig
 from surgsim.compiled import compiled
 from surgsim.teleop.bilateral.base import BilateralScheme, End, numbers
-from surgsim.teleop.bilateral.follower import Follower, FollowerConfig, FollowerLaw, drive
+from surgsim.teleop.bilateral.follower import Follower, FollowerConfig, FollowerLaw, drive, tell_motion
 from surgsim.teleop.messages import FORCE, POSITION, VELOCITY
 from surgsim.teleop.passivity_control import (
     PassivityLaw,
@@ -22,6 +21,7 @@ from surgsim.teleop.passivity_control import (
 from surgsim.tick.algebra import dot
 from surgsim.tick.arrays import Array, Record
 from surgsim.tick.overlay import overlay
+from surgsim.tick.scratch import scratch
 from surgsim.tick.status import GOES_ON
 
 
@@ -112,11 +112,10 @@ def feel(gains: Array, end: End, memory: Array) -> int:
 @compiled
 def tell(gains: Array, end: End, memory: Array) -> int:
     """Book what left the network at the handle and what the controller burnt; what entered is sent."""
-    known, way = memory[:MEMORY_SIZE].view(MEMORY)[0], np.empty(3)
+    known, way = memory[:MEMORY_SIZE].view(MEMORY)[0], scratch(3)
     for i in range(3):
         way[i] = end.position[i] - known.before[i]
-        end.content[POSITION + i], end.content[VELOCITY + i] = end.position[i], end.velocity[i]
-        end.content[FORCE + i] = end.force[i]
+    tell_motion(end)
     work = dot(known.wanted, way)
     observe(known.port, work, work - end.work_j, end.received_j)
     end.energy_j, end.observed_j = max(-work, 0.0), observed(known.port)
@@ -134,7 +133,7 @@ def follow(gains: Array, end: End, memory: Array) -> int:
     alone, so that nothing feeds the motion forward past it.
     """
     law, known = gains[:LAW_SIZE].view(LAW)[0], memory[:MEMORY_SIZE].view(MEMORY)[0]
-    force, velocity, period = np.empty(3), np.empty(3), end.period_s
+    force, velocity, period = scratch(3), scratch(3), end.period_s
     if known.begun == 0:
         known.begun = 1
         for i in range(3):

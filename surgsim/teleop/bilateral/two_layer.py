@@ -2,7 +2,6 @@
 
 from typing import ClassVar, Literal
 
-import numpy as np
 from pydantic import NonNegativeFloat, PositiveFloat
 
 from surgsim.catalog import PartConfig
@@ -20,6 +19,7 @@ from surgsim.teleop.tank import affordable
 from surgsim.tick.algebra import dot
 from surgsim.tick.arrays import Array, Record
 from surgsim.tick.overlay import overlay
+from surgsim.tick.scratch import scratch
 from surgsim.tick.status import GOES_ON
 
 
@@ -142,7 +142,7 @@ def follow(gains: Array, end: End, memory: Array) -> int:
     k as in `feel`, with the follower's mass.
     """
     law, known = gains[:LAW_SIZE].view(LAW)[0], memory[:MEMORY_SIZE].view(MEMORY)[0]
-    force, work = np.empty(3), 0.0
+    force, work = scratch(3), 0.0
     if known.begun == 0:
         known.begun, known.tank_j = 1, law.initial_j
         for i in range(3):

@@ -3,7 +3,6 @@
 import math
 from typing import ClassVar, Literal
 
-import numpy as np
 from pydantic import NonNegativeFloat, PositiveFloat
 
 from surgsim.catalog import PartConfig
@@ -14,6 +13,7 @@ from surgsim.teleop.messages import FORCE, POSITION, VELOCITY
 from surgsim.tick.algebra import dot
 from surgsim.tick.arrays import Array, Record
 from surgsim.tick.overlay import overlay
+from surgsim.tick.scratch import scratch
 from surgsim.tick.status import GOES_ON
 
 
@@ -171,7 +171,7 @@ def follow(gains: Array, end: End, memory: Array) -> int:
         for i in range(3):
             known.reference[i] = end.position[i]
     reconstruct(law, known, end)
-    b, period, force = law.impedance_ns_per_m, end.period_s, np.empty(3)
+    b, period, force = law.impedance_ns_per_m, end.period_s, scratch(3)
     back = 0.0
     for i in range(3):
         gap = known.reference[i] - end.position[i]
