@@ -1,7 +1,6 @@
 """`surgsim compare`."""
 
 import argparse
-import re
 import shlex
 import sys
 from collections.abc import Mapping
@@ -12,7 +11,6 @@ from typing import Any
 from surgsim.cli.paths import path_argument
 from surgsim.cli.scenario_options import add_external, add_matters, add_settings
 
-MOST_SHARDS = 10_000
 HELP = "run a suite of scenarios and controllers, and compare them"
 EXAMPLES = """A suite is a YAML file of scenarios, controllers, a grid of parameters and seeds; scenarios can
 be given instead. Every finished run is written at once. After an interruption --resume runs what is
@@ -50,7 +48,7 @@ def execute(options: argparse.Namespace) -> int:
     """Run the suite; 0 when its table is whole, 1 while other shards are missing or if a run crashed."""
     from surgsim.cli.output import show_batch_progress
     from surgsim.cli.table import print_prose
-    from surgsim.compare.choice import runner_of, workers_for
+    from surgsim.compare.choice import runner_of, shard_of, workers_for
     from surgsim.compare.engine import Batch, compare
     from surgsim.compare.observations import metric_named
     from surgsim.report.write import write_report
@@ -65,7 +63,7 @@ def execute(options: argparse.Namespace) -> int:
         out=out,
         jobs=workers_for(options.jobs),
         resume=options.resume,
-        shard=_shard(options.shard),
+        shard=shard_of(options.shard),
         command="surgsim " + shlex.join(sys.argv[1:]),
     )
     try:
@@ -110,16 +108,6 @@ def _suite(options: argparse.Namespace):  # type: ignore[no-untyped-def]
     matters = parse_matters(options.matters)
     changed = with_changes(suite, controllers, options.seeds, options.record, options.assignments, matters)
     return changed, folder
-
-
-def _shard(text: str) -> tuple[int, int]:
-    from surgsim.errors import SurgsimError
-
-    found = re.fullmatch(r"([0-9]{1,5})/([0-9]{1,5})", text)
-    i, n = (int(found[1]), int(found[2])) if found else (0, 0)
-    if not 1 <= i <= n <= MOST_SHARDS:
-        raise SurgsimError(f"--shard: '{text[:60]}' is not I/N with 1 <= I <= N <= {MOST_SHARDS}")
-    return i, n
 
 
 def _print(table: Any, options: argparse.Namespace, matters: Mapping[str, float]) -> None:

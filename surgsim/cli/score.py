@@ -1,7 +1,6 @@
 """`surgsim score`."""
 
 import argparse
-import re
 import shlex
 import sys
 from contextlib import redirect_stdout
@@ -14,7 +13,6 @@ from surgsim.cli.scenario_options import add_external
 if TYPE_CHECKING:
     from surgsim.protocol.score import Means, Score, Wish
 
-MOST_SHARDS = 10_000
 HELP = "take a controller through the frozen protocol: scorecard and robustness passport"
 EXAMPLES = """The controller is a YAML file, the name of a shipped one or of an installed policy, or a program
 given by --external. Every finished run is kept in the store by the hash of all that it follows from, and is
@@ -166,7 +164,7 @@ def _wish(options: argparse.Namespace) -> "Wish":
 
 
 def _means(options: argparse.Namespace) -> "Means":
-    from surgsim.compare.choice import runner_of, workers_for
+    from surgsim.compare.choice import runner_of, shard_of, workers_for
     from surgsim.protocol.runs import Store
     from surgsim.protocol.score import Means
 
@@ -174,23 +172,13 @@ def _means(options: argparse.Namespace) -> "Means":
         store=Store(folder=_store(options)),
         jobs=workers_for(options.jobs),
         runner=runner_of(options.engine, options.address),
-        shard=_shard(options.shard),
+        shard=shard_of(options.shard),
         command="surgsim " + shlex.join(sys.argv[1:]),
     )
 
 
 def _store(options: argparse.Namespace) -> Path:
     return options.store or Path("runs") / "store"
-
-
-def _shard(text: str) -> tuple[int, int]:
-    from surgsim.errors import SurgsimError
-
-    found = re.fullmatch(r"([0-9]{1,5})/([0-9]{1,5})", text)
-    i, n = (int(found[1]), int(found[2])) if found else (0, 0)
-    if not 1 <= i <= n <= MOST_SHARDS:
-        raise SurgsimError(f"--shard: '{text[:60]}' is not I/N with 1 <= I <= N <= {MOST_SHARDS}")
-    return i, n
 
 
 def _tell_broken(scores: "list[Score]") -> int:

@@ -1,6 +1,7 @@
-"""What a command or a call means: which suite, how many workers, and what does the runs."""
+"""What a command or a call means: which suite, how many workers, what does the runs, and which of them."""
 
 import os
+import re
 from collections.abc import Container, Sequence
 from pathlib import Path
 
@@ -10,6 +11,8 @@ from surgsim.compare.workers import run_jobs
 from surgsim.errors import ScenarioError, SurgsimError, unknown_name
 from surgsim.scenario.drawn import drawn_names
 from surgsim.scenario.load import shipped
+
+MOST_SHARDS = 10_000
 
 
 def suite_named(names: Sequence[str], given: Container[str] = ()) -> tuple[SuiteConfig, Path]:
@@ -75,3 +78,16 @@ def runner_of(engine: str, address: str | None) -> Runner:
 
     runner: Runner = ray_runner(address)
     return runner
+
+
+def shard_of(text: str) -> tuple[int, int]:
+    """Which share of the runs: I and N of `I/N`, counted from 1.
+
+    Raises:
+        SurgsimError: If it is none.
+    """
+    found = re.fullmatch(r"([0-9]{1,5})/([0-9]{1,5})", text)
+    i, n = (int(found[1]), int(found[2])) if found else (0, 0)
+    if not 1 <= i <= n <= MOST_SHARDS:
+        raise SurgsimError(f"--shard: '{text[:60]}' is not I/N with 1 <= I <= N <= {MOST_SHARDS}")
+    return i, n

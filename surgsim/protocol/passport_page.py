@@ -4,7 +4,6 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from surgsim import __version__
 from surgsim.protocol.definition import ProtocolConfig
 from surgsim.protocol.score import Score
 from surgsim.protocol.wording import axis_told, figure_told, sentence, timing_told, tuning_told
@@ -12,7 +11,6 @@ from surgsim.report import html
 
 MARKS = ("●", "■", "▲", "◆", "▼", "✚", "✖", "★")
 """Shapes tell controllers apart where colours do not."""
-_POLICY = "default-src 'none'; style-src 'unsafe-inline'; img-src data:"
 
 
 def passport_page(score: Score, others: Sequence[Score], protocol: ProtocolConfig) -> str:
@@ -31,26 +29,9 @@ def document(title: str, lead: str, body: str) -> str:
     """A page of its own, with the style of reports."""
     report_style = Path(html.__file__).with_name("page.css").read_text(encoding="utf-8")
     style = report_style + Path(__file__).with_name("passport.css").read_text(encoding="utf-8")
-    return f"""<!DOCTYPE html>
-<html lang="en">
-<head>
-<meta charset="utf-8">
-<meta name="viewport" content="width=device-width, initial-scale=1">
-<meta http-equiv="Content-Security-Policy" content="{_POLICY}">
-<meta name="generator" content="surgsim {__version__}">
-<link rel="icon" href="data:,">
-<title>{html.escape(title)}</title>
-<style>{style}</style>
-</head>
-<body>
-<header><div><div class="words"><h1>{html.escape(title)}</h1>
-{lead}</div></div></header>
-<main>
-{body}
-</main>
-</body>
-</html>
-"""
+    words = f"<h1>{html.escape(title)}</h1>\n{lead}"
+    top = f'<header><div><div class="words">{words}</div></div></header>'
+    return html.document(title, style, f"{top}\n<main>\n{body}\n</main>")
 
 
 def _axes_section(score: Score, others: Sequence[Score]) -> str:

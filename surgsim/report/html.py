@@ -8,8 +8,41 @@ from itertools import pairwise
 from pathlib import Path
 from urllib.parse import quote
 
+from surgsim import __version__
 from surgsim.report.figures.curves import legend_mark
 from surgsim.report.figures.svg import colour
+
+_NOTHING_FROM_OUTSIDE = "default-src 'none'; style-src 'unsafe-inline'; {scripts}img-src data:"
+_SCRIPTS = "script-src 'unsafe-inline'; "
+
+
+def document(title: str, style: str, body: str, script: str = "") -> str:
+    """A page that needs nothing but itself, and loads nothing.
+
+    Args:
+        title: Plain text.
+        style: Its CSS.
+        body: Its HTML.
+        script: Its JavaScript; without any, none may run.
+    """
+    scripts, end = (_SCRIPTS, f"<script>{script}</script>\n") if script else ("", "")
+    policy = _NOTHING_FROM_OUTSIDE.format(scripts=scripts)
+    return f"""<!DOCTYPE html>
+<html lang="en">
+<head>
+<meta charset="utf-8">
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<meta http-equiv="Content-Security-Policy" content="{policy}">
+<meta name="generator" content="surgsim {__version__}">
+<link rel="icon" href="data:,">
+<title>{escape(title)}</title>
+<style>{style}</style>
+</head>
+<body>
+{body}
+{end}</body>
+</html>
+"""
 
 
 def escape(text: object) -> str:

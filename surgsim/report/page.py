@@ -4,7 +4,6 @@ import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from surgsim import __version__
 from surgsim.report import html
 from surgsim.report.results import Results
 from surgsim.report.scenes import SceneView
@@ -18,8 +17,6 @@ from surgsim.report.sections.robustness import robustness_section
 from surgsim.report.sections.runs import runs_section
 from surgsim.report.sections.scenarios import scenarios_section
 from surgsim.report.series import Series
-
-_POLICY = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; img-src data:"
 
 
 def page(results: Results, series: Mapping[str, Series], scenes: Sequence[SceneView], file: Path) -> str:
@@ -45,31 +42,11 @@ def page(results: Results, series: Mapping[str, Series], scenes: Sequence[SceneV
         versions_section(results),
     ]
     sections = "\n".join(part for part in parts if part)
-    title = html.escape(f"{results.name}: surgsim report")
     style, script = (
         Path(__file__).with_name(name).read_text(encoding="utf-8") for name in ("page.css", "page.js")
     )
-    return f"""<!DOCTYPE html>
-<html lang="en">
-<head>
-<meta charset="utf-8">
-<meta name="viewport" content="width=device-width, initial-scale=1">
-<meta http-equiv="Content-Security-Policy" content="{_POLICY}">
-<meta name="generator" content="surgsim {__version__}">
-<link rel="icon" href="data:,">
-<title>{title}</title>
-<style>{style}</style>
-</head>
-<body>
-{header(results, boards, scenes)}
-{_navigation(sections)}
-<main>
-{sections}
-</main>
-<script>{script}</script>
-</body>
-</html>
-"""
+    body = f"{header(results, boards, scenes)}\n{_navigation(sections)}\n<main>\n{sections}\n</main>"
+    return html.document(f"{results.name}: surgsim report", style, body, script)
 
 
 def _navigation(sections: str) -> str:
