@@ -4,17 +4,17 @@ import copy
 import json
 import operator
 import os
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from surgsim.control.controller import ControllerConfig
 from surgsim.errors import ScenarioError, unknown_name
-from surgsim.models.config import KINDS
 from surgsim.resources import resource_dir
 from surgsim.scenario.arms import NOT_BESIDE_ARMS, ArmsScenario, Experiment
 from surgsim.scenario.drawn import drawn_document
+from surgsim.scenario.files import files_in
 from surgsim.scenario.plain import document_of
 from surgsim.scenario.schema import Scenario
 from surgsim.scenario.validate import validate
@@ -139,18 +139,9 @@ def _beside_it(document: YamlDocument) -> YamlDocument:
     """`document` with paths of files of arm, instrument and channels from the scenario's own folder on."""
     folder, tree = Path(document.source).parent.absolute(), copy.deepcopy(dict(document.tree))
     for _, holder in _holders(tree):
-        for part in ("robot", "instrument"):
-            _from(folder, holder.get(part), KINDS)
-        task = holder.get("task")
-        for channel in task.values() if isinstance(task, dict) else ():
-            _from(folder, channel, ("trace",))
+        for mapping, key in files_in(holder):
+            mapping[key] = str(folder / mapping[key])
     return replace(document, tree=tree)
-
-
-def _from(folder: Path, given: Any, keys: Iterable[str]) -> None:
-    """Have the paths under `keys` of a mapping begin at `folder`."""
-    if isinstance(given, dict):
-        given.update({key: str(folder / given[key]) for key in keys if isinstance(given.get(key), str)})
 
 
 def _holders(tree: dict[str, Any]) -> list[tuple[KeyPath, dict[str, Any]]]:

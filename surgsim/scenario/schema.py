@@ -19,7 +19,6 @@ from pydantic_core import PydanticCustomError
 from surgsim.catalog import Name, PartConfig
 from surgsim.control.controller import ControllerConfig
 from surgsim.models.config import (
-    KINDS,
     InstrumentConfig,
     PatientConfig,
     PerJoint,
@@ -35,6 +34,7 @@ from surgsim.plant.disturbances.base import DisturbanceConfig
 from surgsim.plant.drive import JointDrives
 from surgsim.plant.part import PlantPart, PlantPartConfig
 from surgsim.plant.props import PROPS
+from surgsim.scenario.files import files_in
 from surgsim.scenario.per_joint import check_lists
 from surgsim.scenario.thresholds import ThresholdsConfig
 from surgsim.tasks import TASKS
@@ -289,5 +289,5 @@ class Scenario(PartConfig):
 
 def files_named(resolved: dict[str, Any]) -> None:
     """Let a resolved scenario, or an arm of one, name its files by their last names alone: for a hash."""
-    for part in filter(None, (resolved["robot"], resolved["instrument"])):
-        part.update({key: Path(part[key]).name for key in KINDS if key in part})
+    for mapping, key in files_in(resolved):
+        mapping[key] = Path(mapping[key]).name

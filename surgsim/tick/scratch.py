@@ -4,8 +4,7 @@ Such an array is gone when the function returns that asked for it. A kernel hand
 read, and never returns it, nor keeps it.
 
 They are lowered where they stand. As inlined overloads they would have numba look for dead code in every
-kernel that uses one. It takes writes to a record's array for dead where the record is laid over an array, and
-it makes such kernels take twice as long to compile.
+kernel that uses one, and it takes writes to a record's array for dead where the record is laid over an array.
 """
 
 from typing import Any

@@ -104,6 +104,17 @@ def test_a_trace_lies_beside_its_scenario(tmp_path):
         load_scenario(str(tmp_path / "mine.yaml"))
 
 
+def test_the_content_of_a_trace_counts_for_the_hash_and_not_its_folder(tmp_path):
+    hashes = []
+    for name, delays in (("a", "0.1\n0.12"), ("b", "0.1\n0.12"), ("c", "0.12\n0.1")):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "net.csv").write_text(f"delay_s\n{delays}\n", encoding="utf-8")
+        content = load_scenario("teleop_wall_panda").resolved()
+        content["task"]["channel"] = {"trace": str(tmp_path / name / "net.csv")}
+        hashes.append(load_scenario(content).sha256())
+    assert hashes[0] == hashes[1] != hashes[2]
+
+
 class Watching:
     """Moves the handle, and writes down what the screen shows it."""
 
