@@ -16,12 +16,13 @@ Redundant and Flexible-Joint Robots (2008), section 3.2, for the torque loop.
 
 import json
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import Annotated, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field, NonNegativeFloat, PositiveFloat, ValidationError
+from pydantic import Field, NonNegativeFloat, PositiveFloat
 from ruamel.yaml import YAML, YAMLError
 
 from surgsim.catalog import PartConfig
@@ -168,10 +169,15 @@ def real_drive(folder: Path) -> DriveConfig | None:
     if not file.is_file():
         return None
     try:
-        read = YAML(typ="safe").load(file)
-        return DriveConfig.model_validate_json(json.dumps(read), strict=True)
-    except (ValidationError, YAMLError) as error:
+        return _drive_of(file.read_text(encoding="utf-8"))
+    except (ValueError, YAMLError) as error:  # of pydantic, too
         raise ValueError(f"{file}: {' '.join(str(error).split())}") from error
+
+
+@lru_cache(maxsize=32)
+def _drive_of(text: str) -> DriveConfig:
+    """Drives as a file's text states them; every scenario of a batch asks for the same few."""
+    return DriveConfig.model_validate_json(json.dumps(YAML(typ="safe").load(text)), strict=True)
 
 
 def _below(low: NotNegative, high: NotNegative) -> bool:
