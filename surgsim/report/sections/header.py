@@ -35,9 +35,10 @@ def _told(results: Results, boards: Boards) -> str:
 
 def _fails(results: Results, one: Failing) -> str:
     order = results.runs.controllers
-    marks = ((html.swatch(order.index(name)), html.escape(name)) for name in one.controllers)
-    names = ", ".join(f'<span class="name">{swatch}<b>{name}</b></span>' for swatch, name in marks)
-    return f'<li class="{"fails" if one.bad else "holds"}">{names}: {html.escape(one.text)}.</li>'
+    marks = [f"{html.swatch(order.index(name))}<b>{html.escape(name)}</b>" for name in one.controllers]
+    stops = [*(len(marks) - 1) * ",", ":"]  # within the names' boxes: no line begins with one
+    names = " ".join(f'<span class="name">{mark}{stop}</span>' for mark, stop in zip(marks, stops, strict=True))
+    return f'<li class="{"fails" if one.bad else "holds"}">{names} {html.escape(one.text)}.</li>'
 
 
 def _counts(results: Results) -> str:
