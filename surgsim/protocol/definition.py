@@ -272,8 +272,12 @@ def entry_label(name: str) -> str:
         ('rcm_mpc_tuned', 'rcm_mpc')
     """
     path, scheme = Path(name.partition("+")[0]), entry_scheme(name)
-    label = f"{path.stem}_tuned" if path.parent.name == "tuned" else path.stem
-    return f"{label}_{scheme}" if scheme else label
+    return with_scheme(f"{path.stem}_tuned" if path.parent.name == "tuned" else path.stem, scheme)
+
+
+def with_scheme(name: str, scheme: str) -> str:
+    """What tables call a controller with a scheme; `name` without one."""
+    return f"{name}_{scheme}" if scheme else name
 
 
 def merged(below: Mapping[str, Any], above: Mapping[str, Any]) -> dict[str, Any]:

@@ -13,7 +13,7 @@ from surgsim.control.external.given import given
 from surgsim.control.policies.registry import policy_names
 from surgsim.errors import ScenarioError, SurgsimError, unknown_name
 from surgsim.protocol.canonical import sha256_of
-from surgsim.protocol.definition import Protocol, TrackConfig
+from surgsim.protocol.definition import Protocol, TrackConfig, with_scheme
 from surgsim.runs.parts import external_names
 from surgsim.scenario.load import find, load_controller, shipped
 
@@ -45,7 +45,7 @@ class Entrant:
     @property
     def name(self) -> str:
         """What tables call it."""
-        return self.label or self.config.name
+        return self.label or with_scheme(self.config.name, self.scheme)
 
     @property
     def definition(self) -> dict[str, Any]:

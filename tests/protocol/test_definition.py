@@ -7,7 +7,7 @@ from surgsim.control.external.given import giving
 from surgsim.errors import ScenarioError, SurgsimError
 from surgsim.protocol import items
 from surgsim.protocol.cells import cells, scenario_tree
-from surgsim.protocol.definition import entry_file, entry_scheme, load_protocol, merged
+from surgsim.protocol.definition import entry_file, entry_label, entry_scheme, load_protocol, merged
 from surgsim.protocol.entrants import ANY, entrant, refusal, track_for
 from surgsim.protocol.seeds import Seeds
 from surgsim.scenario.load import load_controller, shipped
@@ -102,6 +102,12 @@ def test_an_external_program_is_an_entrant_with_the_hash_of_its_file(tmp_path):
     assert who.name == "mine"
     assert who.config.torque_law.name == "mine"
     assert list(who.weights) == ["mine.py"]
+
+
+def test_a_scheme_is_part_of_the_name_that_a_passport_bears():
+    alone = entrant("passive_kinetic", scheme="wave_variables")
+    (entry,) = (e for e in load_protocol("surgsim_v1").config.tracks["teleoperation"].entries if "wave" in e)
+    assert alone.name == entry_label(entry) == "passive_kinetic_wave_variables"
 
 
 def test_an_installed_policy_is_an_entrant():

@@ -37,7 +37,9 @@ def _fails(results: Results, one: Failing) -> str:
     order = results.runs.controllers
     marks = [f"{html.swatch(order.index(name))}<b>{html.escape(name)}</b>" for name in one.controllers]
     stops = [*(len(marks) - 1) * ",", ":"]  # within the names' boxes: no line begins with one
-    names = " ".join(f'<span class="name">{mark}{stop}</span>' for mark, stop in zip(marks, stops, strict=True))
+    names = " ".join(
+        f'<span class="name">{mark}{stop}</span>' for mark, stop in zip(marks, stops, strict=True)
+    )
     return f'<li class="{"fails" if one.bad else "holds"}">{names} {html.escape(one.text)}.</li>'
 
 
