@@ -2,9 +2,9 @@
 
 An instrument is an MJCF file `<name>.xml` whose first body is fixed to the flange, with the sites
 `shaft_entry` and `tip`, and `shaft_end` where the tip is not the shaft's end (`surgsim.models.adopted.tool`).
-There are those that are shipped, in the folders `FOLDERS` of `assets/`; those in folders of their names in the
+There are those that are shipped, in `FOLDERS` of `assets/`; those in folders of their names in the
 folders that the variable `SURGSIM_INSTRUMENTS` lists, as `PATH` lists programs; and those that installed
-packages offer in the entry-point group `surgsim.instruments`: the name, and an importable package whose folder
+packages offer in the entry-point group `surgsim.instruments`: the name, and a package whose folder
 holds the file. A shipped name counts before one on the search path, and that before one of a package.
 """
 
