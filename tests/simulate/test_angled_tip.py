@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from angled import OwnKinematics
 
-from surgsim.errors import UnreachableError
+from surgsim.errors import SurgsimError, UnreachableError
 from surgsim.metrics.catalog import compute_metrics
 from surgsim.models.config import InstrumentConfig, TrocarConfig
 from surgsim.plant.disturbances.push import DISTANCE, SITE, PushConfig
@@ -153,3 +153,8 @@ def test_a_tip_that_leaves_no_shaft_in_the_port_is_refused():
             check_through_port(np.array(tip), "the start at", hook, trocar)
     deepest = -np.hypot(0.389 + past, beside)
     check_through_port(np.array([0.0, 0.0, deepest]), "the start at", hook, trocar)
+
+
+def test_an_insertion_along_the_port_s_axis_is_refused():
+    with pytest.raises(SurgsimError, match="task 'insertion' takes the tip along the port's axis"):
+        prepare(load_scenario("insertion_lwr4plus", assignments=[HOOK, "start={}"]))
