@@ -123,18 +123,25 @@ class ArmModel:
         """The shaft's end in the tip's frame (3,) [m]; zeros of a straight instrument."""
         if not self.is_angled:
             return np.zeros(3)
-        self._place(self.limits.q_min)
-        p: Array = self._rotation.T @ (self._data.site_xpos[self._scene.shaft_end_site] - self._tip)
+        tip, turn, _, end = self._sites
+        p: Array = turn.T @ (end - tip)
         return p
 
     @cached_property
     def p_TA(self) -> Array:
         """The shaft's entry in the tip's frame (3,) [m]."""
-        self._place(self.limits.q_min)
-        entry, end = (
-            self._data.site_xpos[site] for site in (self._scene.shaft_entry_site, self._scene.shaft_end_site)
-        )
+        _, _, entry, end = self._sites
         return self.p_TS - [0.0, 0.0, float(np.linalg.norm(end - entry))]
+
+    @cached_property
+    def _sites(self) -> tuple[Array, Array, Array, Array]:
+        """Place (3,) [m] and turn (3, 3) of the tip, entry and end of the shaft (3,) [m], in some posture."""
+        scene, data = self._scene, mujoco.MjData(self._model)
+        data.qpos[:] = self.limits.q_min
+        mujoco.mj_kinematics(self._model, data)
+        tip, entry, end = scene.tip_site, scene.shaft_entry_site, scene.shaft_end_site
+        x = data.site_xpos
+        return x[tip].copy(), data.site_xmat[tip].reshape(3, 3).copy(), x[entry].copy(), x[end].copy()
 
     def redundancy(self, has_trocar: bool) -> int:
         """Degrees of freedom that are left when the tip, and with a trocar the shaft, are held.

@@ -471,10 +471,11 @@ def test_a_package_brings_an_instrument_that_a_scenario_names(surgsim, tmp_path)
     assert refused.returncode == 2
     assert "instrument 'bad_hook' of the package lab-tools 1.0: " in refused.stderr
     assert refused.stderr.count("\n") == 1
-    short = ("--set", "task.duration_s=1.0", "--set", "task.radius_m=0.005")
+    short = ("--set", "task.duration_s=2.0", "--set", "task.radius_m=0.005")
     words = ("--set", "instrument={name: my_hook}", "--controller", "rcm_inverse_dynamics", "--out", "run")
     done = surgsim("run", "circle_lwr4plus", *short, *words, "--no-record")
     assert done.returncode == 0, done.stderr
-    told = json.loads((tmp_path / "run" / "provenance.json").read_text())["plugins"]
+    run = next((tmp_path / "run").rglob("provenance.json"), tmp_path / "run" / "run.json")
+    told = json.loads(run.read_text())["plugins"]
     assert told["lab_tools"]["version"] == "1.0"
     assert re.fullmatch("[0-9a-f]{64}", told["lab_tools"]["sources_sha256"])
