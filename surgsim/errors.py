@@ -67,7 +67,8 @@ def unknown_name(name: str, kind: str, known: Iterable[str]) -> str:
     """Say that `name` is not a `kind`, list what is, and suggest the nearest match."""
     names = sorted(known)
     shown = name if len(name) <= 60 else f"{name[:57]}..."
-    text = f"'{shown}' is not a {kind}. Known: {_listed(names) or 'none'}."
+    article = "an" if kind[0] in "aeiou" else "a"
+    text = f"'{shown}' is not {article} {kind}. Known: {_listed(names) or 'none'}."
     near = difflib.get_close_matches(shown, names, n=1)
     return f"{text} Did you mean '{near[0]}'?" if near else text
 

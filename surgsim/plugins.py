@@ -20,6 +20,7 @@ GROUPS = (
     "surgsim.bilateral",
     "surgsim.policies",
     "surgsim.robots",
+    "surgsim.instruments",
     "surgsim.metrics",
 )
 """The entry-point groups that surgsim reads."""

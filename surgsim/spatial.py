@@ -58,10 +58,10 @@ def nearest_on_line(p: Array, a: Array, b: Array) -> Array:
 
 
 @compiled
-def shaft_distance(p_C: Array, p_T: Array, p_R: Array) -> float:
-    """Distance of point `p_C` from the line through `p_R` and `p_T` [m]: the RCM error."""
-    ax, ay, az = p_T[0] - p_R[0], p_T[1] - p_R[1], p_T[2] - p_R[2]
-    bx, by, bz = p_C[0] - p_T[0], p_C[1] - p_T[1], p_C[2] - p_T[2]
+def shaft_distance(p_C: Array, p_S: Array, p_R: Array) -> float:
+    """Distance of point `p_C` from the line through `p_R` and `p_S` [m]: the RCM error."""
+    ax, ay, az = p_S[0] - p_R[0], p_S[1] - p_R[1], p_S[2] - p_R[2]
+    bx, by, bz = p_C[0] - p_S[0], p_C[1] - p_S[1], p_C[2] - p_S[2]
     cx, cy, cz = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
     return math.sqrt((cx * cx + cy * cy + cz * cz) / (ax * ax + ay * ay + az * az))
 

@@ -15,6 +15,7 @@ KINDS = (
     "suites",
     "controllers",
     "robots",
+    "instruments",
     "tasks",
     "resolvers",
     "torque-laws",
@@ -67,6 +68,10 @@ def items_of(kind: str) -> list[tuple[str, str]]:
         from surgsim.models.robot import robot_description
 
         return [(name, _described(robot_description, name)) for name in robot_names()]
+    if kind == "instruments":
+        from surgsim.models.instrument_files import instrument_description, instrument_names
+
+        return [(name, _described(instrument_description, name)) for name in instrument_names()]
     if kind == "policies":
         from surgsim.control.policies.registry import policy_names, policy_summary
 

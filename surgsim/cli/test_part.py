@@ -5,8 +5,9 @@ import json
 
 HELP = "test the parts that another package adds"
 EXAMPLES = """Runs the checks that every shipped part passes on the resolvers, torque laws, port and
-instrument estimators, tasks, disturbances, props, plants, bilateral schemes, policies, robots and metrics of
-an installed package. Exit status: 0 all promises hold, 1 one is broken, 2 there is no such package.
+instrument estimators, tasks, disturbances, props, plants, bilateral schemes, policies, robots, instruments
+and metrics of an installed package. Exit status: 0 all promises hold, 1 one is broken, 2 there is no such
+package.
 
 examples:
   surgsim test-part mylab-resolvers

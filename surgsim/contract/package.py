@@ -8,6 +8,7 @@ from surgsim.contract import (
     bilateral,
     configs,
     instrument_estimators,
+    instruments,
     metrics,
     plant_parts,
     policies,
@@ -30,6 +31,8 @@ from surgsim.metrics.outside import GROUP as METRICS
 from surgsim.metrics.outside import load_metric
 from surgsim.models.folders import GROUP as ROBOTS
 from surgsim.models.folders import robot_file, shipped_robots
+from surgsim.models.instrument_files import GROUP as INSTRUMENTS
+from surgsim.models.instrument_files import instrument_file, shipped_instruments
 from surgsim.plant import PLANTS
 from surgsim.plant.disturbances import DISTURBANCES
 from surgsim.plant.props import PROPS
@@ -60,7 +63,7 @@ CHECKS: dict[str, tuple[Check, ...]] = {
     BILATERAL.kind: bilateral.CHECKS,
 }
 _BY_GROUP = {catalog.group: catalog for catalog in CATALOGS}
-_OTHER_KINDS = {POLICIES: "policy", METRICS: "metric", ROBOTS: "robot"}
+_OTHER_KINDS = {POLICIES: "policy", METRICS: "metric", ROBOTS: "robot", INSTRUMENTS: "instrument"}
 _LOADS = "is found and loads"
 
 
@@ -100,6 +103,8 @@ def _of_offer(offer: Offer, unread: str | None) -> Iterator[Result]:
         yield from _run(kind, offer.name, lambda: find_policy(offer.name), policies.CHECKS)
     elif offer.group == METRICS:
         yield from _run(kind, offer.name, lambda: load_metric(offer, SHIPPED), metrics.CHECKS)
+    elif offer.group == INSTRUMENTS:
+        yield from _run(kind, offer.name, lambda: _instrument(offer.name), instruments.CHECKS)
     elif catalog is None:
         yield from _run(kind, offer.name, lambda: _robot(offer.name), robots.CHECKS)
     elif offer.name in catalog.places:
@@ -118,6 +123,18 @@ def _robot(name: str) -> str:
     if name in shipped_robots():
         raise SurgsimError("the name is that of a shipped robot, which hides it")
     robot_file(name)
+    return name
+
+
+def _instrument(name: str) -> str:
+    """The name of an instrument that this package brings.
+
+    Raises:
+        SurgsimError: If its file is not found, or a shipped instrument hides it.
+    """
+    if name in shipped_instruments():
+        raise SurgsimError("the name is that of a shipped instrument, which hides it")
+    instrument_file(name)
     return name
 
 

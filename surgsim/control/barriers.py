@@ -52,9 +52,9 @@ def entry_curvature(
     linear, angular, axis, rate = scratch(3), scratch(3), scratch(3), scratch(2)
     error, moving, bias, omega = scratch(2), scratch(2), scratch(2), scratch(3)
     J, normals = scratch_matrix(2, v.size), scratch_matrix(2, 3)
-    fill_velocity_products(model.Jv_WT, model.z_W, v, linear, angular)
-    fill_rcm(model.p_WT, model.R_WT, model.Jv_WT, model.Jw_WT, p_WC, v_WC, error, J, moving, normals)
-    fill_rcm_bias(model.p_WT, model.R_WT, model.Jv_WT, model.Jw_WT, v, p_WC, v_WC, linear, angular, bias)
+    fill_velocity_products(model.Jv_WS, model.z_W, v, linear, angular)
+    fill_rcm(model.p_WS, model.R_WT, model.Jv_WS, model.Jw_WT, p_WC, v_WC, error, J, moving, normals)
+    fill_rcm_bias(model.p_WS, model.R_WT, model.Jv_WS, model.Jw_WT, v, p_WC, v_WC, linear, angular, bias)
     times(model.Jw_WT, v, omega)
     axis[:] = model.R_WT[:, 2]
     cross(omega, axis, axis)

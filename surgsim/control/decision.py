@@ -201,5 +201,5 @@ def _bound(seen: Seen) -> None:
 def _rcm(seen: Seen) -> None:
     r = seen
     r.depth = fill_rcm(
-        r.p_WT, r.R_WT, r.Jv_WT, r.Jw_WT, r.p_WC, r.v_WC, r.rcm_error, r.J_rcm, r.rcm_velocity, r.normals
+        r.p_WS, r.R_WT, r.Jv_WS, r.Jw_WT, r.p_WC, r.v_WC, r.rcm_error, r.J_rcm, r.rcm_velocity, r.normals
     )

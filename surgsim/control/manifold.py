@@ -72,9 +72,9 @@ def fill_constraints(model: Model, on: Manifold, J: Array, residual: Array) -> N
         at_rest, rate, normals = scratch(3), scratch(2), scratch_matrix(2, 3)
         at_rest[:] = 0.0
         fill_rcm(
-            model.p_WT,
+            model.p_WS,
             model.R_WT,
-            model.Jv_WT,
+            model.Jv_WS,
             model.Jw_WT,
             on.p_WC,
             at_rest,
@@ -185,10 +185,12 @@ def _fill_wrench(
 ) -> None:
     """Rows force and moment (2, 3) of the constraints' multipliers, and how they change with the tip.
 
-        f = l_1..3 + a,   t = s b,   a = l_4 n_1 + l_5 n_2,   b = l_5 n_1 - l_4 n_2,   s = d . (p - C)
-        df = w x a,   dt = ds b + s w x b,   ds = (w x d) . (p - C) + d . dp
+        f = l_1..3 + a,   t = s b + o x a,   a = l_4 n_1 + l_5 n_2,   b = l_5 n_1 - l_4 n_2
+        df = w x a,   dt = ds b + s w x b + w x (o x a)
+        s = d . (p_S - C),   ds = (w x d) . (p_S - C) + d . (dp + w x o)
 
-    The rows of `tip` (2, 3) are its displacement dp and its turn w; n_1, n_2 and d are its axes.
+    The rows of `tip` (2, 3) are its displacement dp and its turn w; n_1, n_2 and d are its axes, and the
+    shaft's end p_S is o from it.
     """
     change[:] = 0.0
     for i in range(3):
@@ -204,7 +206,7 @@ def _fill_wrench(
         d[i] = R[i, 2]
     cross(tip[1], d, turned)
     for i in range(3):
-        reach = model.p_WT[i] - on.p_WC[i]
+        reach = model.p_WS[i] - on.p_WC[i]
         s += d[i] * reach
         ds += turned[i] * reach + d[i] * tip[0, i]
     cross(tip[1], a, change[0])
@@ -213,6 +215,23 @@ def _fill_wrench(
         wrench[0, i] += a[i]
         wrench[1, i] = s * b[i]
         change[1, i] = ds * b[i] + s * turned[i]
+    if model.angled:
+        _add_offset(model, a, b, d, tip[1], wrench, change)
+
+
+@compiled
+def _add_offset(model: Model, a: Array, b: Array, d: Array, w: Array, wrench: Array, change: Array) -> None:
+    """Add to the moment and its change what the offset o of the shaft's end from the tip makes of a and b."""
+    o, about, turned = scratch(3), scratch(3), scratch(3)
+    for i in range(3):
+        o[i] = model.p_WS[i] - model.p_WT[i]
+    cross(w, o, turned)
+    ds = dot(d, turned)
+    cross(o, a, about)
+    cross(w, about, turned)
+    for i in range(3):
+        wrench[1, i] += about[i]
+        change[1, i] += ds * b[i] + turned[i]
 
 
 @compiled

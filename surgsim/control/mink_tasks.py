@@ -12,16 +12,22 @@ _VIEWS = ("_data", "_N", "_d", "_p")
 
 
 class RcmTask(mink.Task):  # type: ignore[misc]
-    """Error e_N = N (p - C) and Jacobian of `surgsim.control.rcm`, for mink's solver.
+    """Error e_N = N (p - C) and Jacobian of `surgsim.control.rcm`, p the shaft's end, for mink's solver.
 
     mink solves J dq = -gain * error; a trocar displacement over the step enters through `target`.
+
+    Args:
+        end_site: The shaft's end, z along the shaft.
+        nv: Joints.
+        cost: Weight of each row.
+        gain: Share of the error that a step takes.
     """
 
     _data: mujoco.MjData | None = None
 
-    def __init__(self, tip_site: int, nv: int, cost: float = 1.0, gain: float = 1.0) -> None:
+    def __init__(self, end_site: int, nv: int, cost: float = 1.0, gain: float = 1.0) -> None:
         super().__init__(cost=np.full(2, cost), gain=gain)
-        self._site = tip_site
+        self._site = end_site
         self._jacp = np.zeros((3, nv))
         self._jacr = np.zeros((3, nv))
         self._turned = np.zeros((2, 3))
@@ -49,7 +55,7 @@ class RcmTask(mink.Task):  # type: ignore[misc]
         return jacobian
 
     def _look_at(self, configuration: mink.Configuration) -> None:
-        """Make views of what is read of a configuration's data: N, d and the tip, once for all its states."""
+        """Make views of what is read of a configuration's data: N, d and p, once for all its states."""
         data = configuration.data
         if data is not self._data:
             turn = data.site_xmat[self._site].reshape(3, 3)

@@ -1,6 +1,7 @@
 """Kinematics of the remote centre of motion: the shaft axis and the trocar point.
 
-With tip position p, unit shaft axis d, trocar C and r = p - C = s d + e, the RCM error is e = (I - d d^T) r.
+With the shaft's end at p (the tip, but for angled tips), unit shaft axis d, trocar C and r = p - C = s d + e,
+the RCM error is e = (I - d d^T) r.
 Its norm is the distance from the trocar to the axis, equal to the norm of eq. (2) of the VPRNN paper, and
 s is the insertion depth. Two directions N (2, 3) normal to the shaft span it:
 
@@ -35,7 +36,7 @@ class Rcm:
         jacobian: J_rcm (2, n) [m/rad].
         trocar_velocity: N C' (2,) [m/s]; the error's rate is `jacobian @ v - trocar_velocity`.
         normals: N (2, 3), unit rows normal to the shaft.
-        depth: Insertion depth s [m], negative while the tip is outside the patient.
+        depth: Insertion depth s [m], negative while the shaft's end is outside the patient.
     """
 
     error: Array
@@ -49,7 +50,7 @@ def rcm_kinematics(kin: Kinematics, p_WC: Array, v_WC: Array) -> Rcm:
     """RCM error and Jacobian for a trocar at `p_WC` (3,) [m] moving at `v_WC` (3,) [m/s]."""
     n = kin.Jv_WT.shape[1]
     error, jacobian, velocity, normals = np.empty(2), np.empty((2, n)), np.empty(2), np.empty((2, 3))
-    depth = fill_rcm(kin.p_WT, kin.R_WT, kin.Jv_WT, kin.Jw_WT, p_WC, v_WC, error, jacobian, velocity, normals)
+    depth = fill_rcm(kin.p_WS, kin.R_WT, kin.Jv_WS, kin.Jw_WT, p_WC, v_WC, error, jacobian, velocity, normals)
     return Rcm(error=error, jacobian=jacobian, trocar_velocity=velocity, normals=normals, depth=depth)
 
 
@@ -101,11 +102,11 @@ def rcm_bias_acceleration(
         v: Joint velocities (n,) [rad/s].
         p_WC: Trocar position (3,) [m].
         v_WC: Trocar velocity (3,) [m/s].
-        linear: Jv' v (3,) [m/s^2].
+        linear: Jv' v of the shaft's end (3,) [m/s^2].
         angular: Jw' v (3,) [rad/s^2].
     """
     out = np.empty(2)
-    fill_rcm_bias(kin.p_WT, kin.R_WT, kin.Jv_WT, kin.Jw_WT, v, p_WC, v_WC, linear, angular, out)
+    fill_rcm_bias(kin.p_WS, kin.R_WT, kin.Jv_WS, kin.Jw_WT, v, p_WC, v_WC, linear, angular, out)
     return out
 
 
@@ -148,6 +149,6 @@ def rcm_cross_form(kin: Kinematics, p_WC: Array) -> tuple[Array, Array]:
     E = (C - r_wrist) x (p - r_wrist) / |p - r_wrist| = d x (p - C), so dE = [d]x Jv + [r]x [d]x Jw.
     """
     d = kin.R_WT[:, 2]
-    r = kin.p_WT - p_WC
+    r = kin.p_WS - p_WC
     D = skew(d)
-    return cross_product(d, r), D @ kin.Jv_WT + skew(r) @ D @ kin.Jw_WT
+    return cross_product(d, r), D @ kin.Jv_WS + skew(r) @ D @ kin.Jw_WT

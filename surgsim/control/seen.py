@@ -50,6 +50,8 @@ def kinematics_of(seen: Fields) -> Kinematics:
         R_WT=seen["R_WT"].copy(),
         Jv_WT=seen["Jv_WT"].copy(),
         Jw_WT=seen["Jw_WT"].copy(),
+        p_WS=seen["p_WS"].copy(),
+        Jv_WS=seen["Jv_WS"].copy(),
         z_W=seen["z_W"].copy(),
         anchors_W=seen["anchors_W"].copy(),
     )
@@ -133,6 +135,7 @@ def fill_kinematics(seen: Seen, kin: Kinematics) -> None:
     """Write kinematics into a record."""
     seen["p_WT"], seen["R_WT"] = kin.p_WT, kin.R_WT
     seen["Jv_WT"], seen["Jw_WT"] = kin.Jv_WT, kin.Jw_WT
+    seen["p_WS"], seen["Jv_WS"] = kin.p_WS, kin.Jv_WS
     seen["z_W"], seen["anchors_W"] = kin.z_W, kin.anchors_W
 
 

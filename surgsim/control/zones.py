@@ -6,7 +6,8 @@ With the squared distance D of two things, one of them the instrument's, the row
 
 since R^2 - D, or D - R^2, then decays no faster than exp(-eta t). D is squared because the distance has no
 gradient where it is zero. The instrument's point nearest to the other thing is p + t z, on the line through
-the tip p along the shaft z, or the tip itself, t = 0; c is the point of the other thing nearest to that:
+the shaft's end p along the shaft z, or the tip p itself, t = 0; c is the point of the other thing nearest to
+that:
 
     delta = p + t z - c,   D = delta . delta,   D' = J_D q' + zeta
     J_D = 2 delta^T (J_p - t [z]x J_w),   zeta = -2 delta . c'
@@ -91,7 +92,8 @@ def fill_zone_rows(zones: Array, eta: float, seen: Seen, G: Array, most: Array) 
         zone = zones[ZONE * k : ZONE * (k + 1)]
         t = _apart(zone, seen, delta)
         sign = -1.0 if zone[OUTSIDE] != 0.0 else 1.0
-        _squared_distance_row(seen, delta, t, G[k])
+        of_shaft = zone[OF_SHAFT] != 0.0
+        _squared_distance_row(seen.Jv_WS if of_shaft else seen.Jv_WT, seen, delta, t, G[k])
         for j in range(seen.q.size):
             G[k, j] *= sign
         most[k] = sign * eta * (zone[RADIUS] * zone[RADIUS] - dot(delta, delta))
@@ -120,8 +122,8 @@ def fill_entry_row(radius: float, eta: float, seen: Seen, row: Array) -> float:
 
 
 @compiled
-def _squared_distance_row(seen: Seen, delta: Array, t: float, row: Array) -> None:
-    """Fill the first n entries of `row` with J_D."""
+def _squared_distance_row(Jv: Array, seen: Seen, delta: Array, t: float, row: Array) -> None:
+    """Fill the first n entries of `row` with J_D, with the Jacobian of p (3, n)."""
     z, w, moved = scratch(3), scratch(3), scratch(3)
     z[:] = seen.R_WT[:, 2]
     for j in range(seen.q.size):
@@ -129,7 +131,7 @@ def _squared_distance_row(seen: Seen, delta: Array, t: float, row: Array) -> Non
         cross(w, z, moved)
         s = 0.0
         for i in range(3):
-            s += delta[i] * (seen.Jv_WT[i, j] + t * moved[i])
+            s += delta[i] * (Jv[i, j] + t * moved[i])
         row[j] = 2.0 * s
 
 
@@ -139,12 +141,12 @@ def _apart(zone: Array, seen: Seen, delta: Array) -> float:
     z, r, point, u = scratch(3), scratch(3), zone[POINT:DIRECTION], zone[DIRECTION:]
     z[:] = seen.R_WT[:, 2]
     for i in range(3):
-        r[i] = seen.p_WT[i] - point[i]
+        r[i] = (seen.p_WS[i] if zone[OF_SHAFT] != 0.0 else seen.p_WT[i]) - point[i]
     along = dot(r, u) if zone[IS_LINE] != 0.0 else 0.0
     t = 0.0
     if zone[OF_SHAFT] != 0.0:
         c = dot(z, u) if zone[IS_LINE] != 0.0 else 0.0
-        if 1.0 - c * c > _PARALLEL:  # of two parallel lines the tip is as near as any point
+        if 1.0 - c * c > _PARALLEL:  # of two parallel lines the shaft's end is as near as any point
             t = (c * along - dot(r, z)) / (1.0 - c * c)
             along += t * c
     for i in range(3):

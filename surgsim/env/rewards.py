@@ -14,7 +14,7 @@ Array = NDArray[np.float64]
 def errors(truth: Truth, command: TipCommand, has_trocar: bool) -> tuple[float, float | None]:
     """Tip and RCM error [m], as the trace defines them; no RCM error without a trocar."""
     tip = float(np.linalg.norm(truth.p_WT - command.p_WTd))
-    return tip, float(shaft_distance(truth.p_WC, truth.p_WT, truth.p_WR)) if has_trocar else None
+    return tip, float(shaft_distance(truth.p_WC, truth.p_WS, truth.p_WR)) if has_trocar else None
 
 
 def reward(tip_error_m: float, rcm_error_m: float | None) -> float:

@@ -33,6 +33,8 @@ class Kinematics:
         R_WT: Tip orientation (3, 3); its third column is the shaft axis, from adapter to tip.
         Jv_WT: Translational tip Jacobian (3, n) [m/rad].
         Jw_WT: Rotational tip Jacobian (3, n) [-].
+        p_WS: Position of the shaft's end (3,) [m]: the tip of a straight instrument.
+        Jv_WS: Its translational Jacobian (3, n) [m/rad].
         z_W: Joint axes as rows (n, 3), unit.
         anchors_W: Points on the joint axes as rows (n, 3) [m].
     """
@@ -41,6 +43,8 @@ class Kinematics:
     R_WT: Array
     Jv_WT: Array
     Jw_WT: Array
+    p_WS: Array
+    Jv_WS: Array
     z_W: Array
     anchors_W: Array
 
@@ -109,11 +113,35 @@ class ArmModel:
         turned = cross(kin.z_W[-1], kin.R_WT[:, 2])
         return bool(np.abs(turned).max() < _ALONG and np.abs(kin.Jv_WT[:, -1]).max() < _ALONG)
 
+    @property
+    def is_angled(self) -> bool:
+        """Whether the tip is not the shaft's end."""
+        return self._scene.shaft_end_site != self._scene.tip_site
+
     @cached_property
-    def shaft_length_m(self) -> float:
-        """Distance of the shaft's entry from the tip [m], the same in every posture."""
-        self._place(self.limits.q_min)
-        return float(np.linalg.norm(self._tip - self._data.site_xpos[self._scene.shaft_entry_site]))
+    def p_TS(self) -> Array:
+        """The shaft's end in the tip's frame (3,) [m]; zeros of a straight instrument."""
+        if not self.is_angled:
+            return np.zeros(3)
+        tip, turn, _, end = self._sites
+        p: Array = turn.T @ (end - tip)
+        return p
+
+    @cached_property
+    def p_TA(self) -> Array:
+        """The shaft's entry in the tip's frame (3,) [m]."""
+        _, _, entry, end = self._sites
+        return self.p_TS - [0.0, 0.0, float(np.linalg.norm(end - entry))]
+
+    @cached_property
+    def _sites(self) -> tuple[Array, Array, Array, Array]:
+        """Place (3,) [m] and turn (3, 3) of the tip, entry and end of the shaft (3,) [m], in some posture."""
+        scene, data = self._scene, mujoco.MjData(self._model)
+        data.qpos[:] = self.limits.q_min
+        mujoco.mj_kinematics(self._model, data)
+        tip, entry, end = scene.tip_site, scene.shaft_entry_site, scene.shaft_end_site
+        x = data.site_xpos
+        return x[tip].copy(), data.site_xmat[tip].reshape(3, 3).copy(), x[entry].copy(), x[end].copy()
 
     def redundancy(self, has_trocar: bool) -> int:
         """Degrees of freedom that are left when the tip, and with a trocar the shaft, are held.
@@ -141,6 +169,7 @@ class ArmModel:
         record.xaxis, record.xanchor = data.xaxis.ctypes.data, data.xanchor.ctypes.data
         record.xpos, record.xmat, record.nbody = data.xpos.ctypes.data, data.xmat.ctypes.data, model.nbody
         record.damping[:] = self.damping
+        record.angled, record.p_TS[:] = self.is_angled, self.p_TS
         return data
 
     def kinematics(self, q: Array) -> Kinematics:
@@ -167,11 +196,17 @@ class ArmModel:
         n = self._model.nv
         Jv, Jw = np.empty((3, n)), np.empty((3, n))
         mujoco.mj_jacSite(self._model, self._data, Jv, Jw, self._scene.tip_site)
+        end, Jv_end = self._scene.shaft_end_site, Jv
+        if self.is_angled:
+            Jv_end = np.empty((3, n))
+            mujoco.mj_jacSite(self._model, self._data, Jv_end, None, end)
         return Kinematics(
             p_WT=self._tip.copy(),
             R_WT=self._rotation.copy(),
             Jv_WT=Jv,
             Jw_WT=Jw,
+            p_WS=self._data.site_xpos[end].copy(),
+            Jv_WS=Jv_end,
             z_W=self._axes.copy(),
             anchors_W=self._anchors.copy(),
         )

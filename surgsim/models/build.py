@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surgsim.errors import SurgsimError
+from surgsim.models.adopted.tool import SHAFT_END
 from surgsim.models.collision import CollisionShapes, collision_shapes
 from surgsim.models.config import RobotConfig, SceneConfig, WallConfig
 from surgsim.models.drive import DriveConfig
@@ -52,7 +53,8 @@ class Scene:
         actuator_ids: Where its motors are in `ctrl` (n,).
         flange_site: Flange, z along the tool.
         tip_site: Instrument tip, z along the shaft; the flange without an instrument.
-        shaft_entry_site: Start of the shaft, a second point of its axis; the wrist without an instrument.
+        shaft_entry_site: Start of the shaft, a point of its axis; the wrist without an instrument.
+        shaft_end_site: End of the shaft, a second point of its axis, z along it; the tip if it is not angled.
         trocar_site: Remote centre of motion, z out of the patient.
         port_mocap: Row of the port in `mocap_pos`.
         wall: The compliant wall; None if the trocar is an ideal point.
@@ -73,6 +75,7 @@ class Scene:
     flange_site: int
     tip_site: int
     shaft_entry_site: int
+    shaft_end_site: int
     trocar_site: int | None
     port_mocap: int | None
     wall: WallConfig | None
@@ -213,6 +216,7 @@ def _scene(model: mujoco.MjModel, config: SceneConfig, prefix: str = "") -> Scen
     slides = [] if wall is None else [parts.joint(name) for name in CANNULA_JOINTS]
     joints = [parts.joint(name) for name in joint_names(parts)]
     port = parts.find(mujoco.mjtObj.mjOBJ_BODY, "port")
+    end = parts.find(mujoco.mjtObj.mjOBJ_SITE, SHAFT_END)
     return Scene(
         model=model,
         qpos_ids=_ids([joint.qposadr[0] for joint in joints]),
@@ -221,6 +225,7 @@ def _scene(model: mujoco.MjModel, config: SceneConfig, prefix: str = "") -> Scen
         flange_site=parts.site("flange").id,
         tip_site=parts.site("tip").id,
         shaft_entry_site=parts.site("shaft_entry").id,
+        shaft_end_site=parts.site("tip" if end < 0 else SHAFT_END).id,
         trocar_site=parts.site("trocar").id if port >= 0 else None,
         port_mocap=int(model.body_mocapid[port]) if port >= 0 else None,
         wall=wall,

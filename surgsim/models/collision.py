@@ -89,7 +89,7 @@ def _left_out(model: Named, instrument: InstrumentConfig | None) -> set[tuple[st
     """Pairs that the arm's text `never_touch` names; its adapter is a short one on the flange itself."""
     words = (model.text(NEVER_TOUCH) or "").split()
     pairs = {(one, other) for one, _, other in (word.partition("-") for word in words)}
-    usual = instrument is not None and instrument.mjcf is None and instrument.holder is None
+    usual = instrument is not None and not instrument.of_file and instrument.holder is None
     if usual and instrument is not None and instrument.adapter_length_m <= ADAPTER_M:
         return pairs
     return {pair for pair in pairs if "adapter" not in pair}

@@ -21,15 +21,22 @@ from pydantic import (
 from pydantic_core import PydanticCustomError
 
 from surgsim.catalog import PartConfig
+from surgsim.errors import SurgsimError
 from surgsim.models.adopted.arm import adopted
 from surgsim.models.adopted.config import KINDS as KINDS
 from surgsim.models.adopted.config import ArmFileConfig
 from surgsim.models.adopted.config import Vec3 as Vec3
 from surgsim.models.adopted.file import checked_sha256
 from surgsim.models.adopted.problem import AdoptionError
-from surgsim.models.adopted.tool import Tool, read_tool
+from surgsim.models.adopted.tool import SHAFT_END, Tool, read_tool
 from surgsim.models.drive import DriveConfig, real_drive
 from surgsim.models.folders import is_shipped, known_robot, robot_file, with_literal_variant
+from surgsim.models.instrument_files import (
+    instrument_file,
+    instrument_origin,
+    known_instrument,
+    shipped_instruments,
+)
 
 
 @dataclass(frozen=True)
@@ -40,6 +47,7 @@ class ForEachJoint:
 PerJoint = Annotated[tuple[FiniteFloat, ...], ForEachJoint()]
 """A number for each joint, from the base on (n,)."""
 RobotName = Annotated[str, AfterValidator(known_robot)]
+InstrumentName = Annotated[str, AfterValidator(known_instrument)]
 
 
 class RobotConfig(ArmFileConfig):
@@ -157,15 +165,20 @@ class InstrumentConfig(PartConfig):
     The tip is `adapter_length_m + shaft_length_m` from the flange.
 
     Attributes:
+        name: An instrument's file that is shipped, on the search path, or of an installed package.
         mjcf: An MJCF file whose first body is fixed to the flange; lengths, mass and inertia are its own.
         shaft_entry_site: Site of the file at the start of the shaft.
-        tip_site: Site of the file at the tip: the shaft is straight from the one to the other.
+        shaft_end_site: Site of the file at the end of the shaft, which is straight from the one to the other;
+            the tip where the file has no `shaft_end`.
+        tip_site: Site of the file at the tip.
         files_sha256: Hash of the file and all that it names; filled in, and checked where it is given.
         holder: A rigid holder between flange and instrument.
     """
 
+    name: InstrumentName | None = None
     mjcf: str | None = None
     shaft_entry_site: str = "shaft_entry"
+    shaft_end_site: str = SHAFT_END
     tip_site: str = "tip"
     files_sha256: str | None = None
     holder: HolderConfig | None = None
@@ -178,23 +191,45 @@ class InstrumentConfig(PartConfig):
 
     @model_validator(mode="after")
     def _is_of_a_file_or_made(self) -> Self:
-        if self.mjcf is not None:
-            with placed_errors():
-                self._read_file(Path(self.mjcf))
-            return self
-        for key in OF_TOOL_FILES:
-            if getattr(self, key) != type(self).model_fields[key].default:
+        if self.name is not None and self.mjcf is not None:
+            raise ValueError("give one of name and mjcf")
+        hashed = self.mjcf is not None or (self.name is not None and self.name not in shipped_instruments())
+        for key in OF_TOOL_FILES if self.mjcf is None else ():
+            if getattr(self, key) != type(self).model_fields[key].default and not (key in HASH and hashed):
                 raise ValueError(f"{key} is for an instrument from a file: give mjcf")
-        return self._checked_com()
+        if not self.of_file:
+            return self._checked_com()
+        with placed_errors(), self._told_of_package():
+            self._read_file(hashed)
+        return self
 
-    def _read_file(self, path: Path) -> None:
+    @contextmanager
+    def _told_of_package(self) -> Iterator[None]:
+        """Say which instrument, and of which package, where the file of one with a name is wrong."""
+        try:
+            yield
+        except SurgsimError as error:
+            if self.name is None:
+                raise
+            at = [key for key in getattr(error, "at", ()) if key in (*OF_ROD, *HASH)]
+            told = str(error) if str(error).startswith("instrument '") else f"{self._label}: {error}"
+            raise AdoptionError(told, *(at or ["name"])) from error
+
+    @property
+    def _label(self) -> str:
+        origin = "" if self.name is None else instrument_origin(self.name)
+        return f"instrument '{self.name}'" + (f" {origin}" if origin else "")
+
+    def _read_file(self, hashed: bool) -> None:
         """Fill in the whole path, the hash, and the lengths that the file has."""
         stated = [key for key in OF_ROD if key in self.model_fields_set]
         if stated:
             raise AdoptionError(f"{stated[0]} is read from the instrument's file: leave it out", stated[0])
-        found = checked_sha256(path, "mjcf", self.files_sha256)
-        object.__setattr__(self, "files_sha256", found)  # frozen, but still being made
-        object.__setattr__(self, "mjcf", os.path.abspath(path))
+        if hashed:
+            found = checked_sha256(self._path, "mjcf", self.files_sha256)
+            object.__setattr__(self, "files_sha256", found)  # frozen, but still being made
+        if self.mjcf is not None:
+            object.__setattr__(self, "mjcf", os.path.abspath(self.mjcf))
         for key in ("adapter_length_m", "shaft_length_m"):
             object.__setattr__(self, key, getattr(self.tool, key))
 
@@ -202,8 +237,28 @@ class InstrumentConfig(PartConfig):
     def _without_what_has_no_use(self, write: SerializerFunctionWrapHandler) -> dict[str, Any]:
         """Of the one from a file what it has itself is left out, of the other the keys for files."""
         every: dict[str, Any] = write(self)
-        idle = OF_TOOL_FILES if self.mjcf is None else (*OF_ROD, "type")
-        return {key: v for key, v in every.items() if key not in idle and (key != "holder" or v is not None)}
+        of_file = (*OF_ROD, "type")
+        if self.name is not None:
+            idle = (*OF_TOOL_FILES[: -len(HASH)], *of_file)
+        else:
+            idle = ("name", *(OF_TOOL_FILES if self.mjcf is None else of_file))
+        optional = ("holder", *HASH)
+        return {
+            key: v for key, v in every.items() if key not in idle and (key not in optional or v is not None)
+        }
+
+    @property
+    def of_file(self) -> bool:
+        """Whether it is from a file, with a name or without."""
+        return self.name is not None or self.mjcf is not None
+
+    @property
+    def _path(self) -> Path:
+        if self.name is not None:
+            return instrument_file(self.name)
+        if self.mjcf is None:
+            raise ValueError("the instrument is of no file")
+        return Path(self.mjcf)
 
     @property
     def tool(self) -> Tool:
@@ -213,9 +268,16 @@ class InstrumentConfig(PartConfig):
             AdoptionError: If it is no instrument.
             ValueError: If it is of no file.
         """
-        if self.mjcf is None or self.files_sha256 is None:
-            raise ValueError("the instrument is of no file")
-        return read_tool(Path(self.mjcf), self.shaft_entry_site, self.tip_site, self.files_sha256)
+        sites = (self.shaft_entry_site, self.shaft_end_site, self.tip_site)
+        return read_tool(self._path, *sites, self.files_sha256 or "")
+
+    @property
+    def tip_from_shaft_m(self) -> tuple[float, float]:
+        """How far the tip is beside the shaft's line, and past the shaft's end along it [m]."""
+        if not self.of_file:
+            return 0.0, 0.0
+        x, y, z = self.tool.p_ST
+        return math.hypot(x, y), float(z)
 
     def _checked_com(self) -> Self:
         low, high = 0.5 * self.adapter_length_m, self.adapter_length_m + 0.5 * self.shaft_length_m
@@ -227,7 +289,7 @@ class InstrumentConfig(PartConfig):
         return self
 
 
-OF_TOOL_FILES = ("mjcf", "shaft_entry_site", "tip_site", "files_sha256")
+OF_TOOL_FILES = ("mjcf", "shaft_entry_site", "shaft_end_site", "tip_site", "files_sha256")
 OF_ROD = ("shaft_length_m", "adapter_length_m", "mass_kg", "com_m")
 """Keys of the shipped instrument alone."""
 

@@ -20,7 +20,7 @@ import mujoco
 from surgsim.catalog import NAME
 from surgsim.errors import SurgsimError, unknown_name
 from surgsim.models.graft import read_mjcf
-from surgsim.plugins import offers
+from surgsim.plugins import Offer, offers
 from surgsim.resources import resource_dir
 
 ROBOTS, TEST_ARMS = "robots", "test_arms"
@@ -33,7 +33,7 @@ LITERAL_D2 = "literal_d2_m"
 
 def robot_names() -> list[str]:
     """Names of all robots, sorted: those that are shipped, on the search path, and of other packages."""
-    return sorted({*_files(_shipped(ROBOTS)), *_on_path(), *offers(GROUP)})
+    return sorted({*_files(_shipped(ROBOTS)), *on_path(SEARCH_PATH), *offers(GROUP)})
 
 
 def shipped_robots() -> list[str]:
@@ -59,15 +59,15 @@ def known_robot(name: str) -> str:
     """
     if name not in (*robot_names(), *arms_for_tests()):
         hint = " A file is given as mjcf or urdf." if Path(name).suffix in (".xml", ".urdf", ".mjcf") else ""
-        raise ValueError(unknown_name(name, "robot", robot_names()) + hint + _lost())
+        raise ValueError(unknown_name(name, "robot", robot_names()) + hint + lost_of(SEARCH_PATH))
     return name
 
 
-def _lost() -> str:
-    """Which folders of the search path are not there."""
-    folders = [folder for folder in os.environ.get(SEARCH_PATH, "").split(os.pathsep) if folder]
+def lost_of(variable: str) -> str:
+    """Which folders of the search path in an environment variable are not there, as the end of a message."""
+    folders = [folder for folder in os.environ.get(variable, "").split(os.pathsep) if folder]
     lost = [folder for folder in folders if not Path(folder).is_dir()]
-    return f" {SEARCH_PATH} lists {', '.join(lost)}, which is no folder." if lost else ""
+    return f" {variable} lists {', '.join(lost)}, which is no folder." if lost else ""
 
 
 def robot_file(name: str) -> Path:
@@ -76,11 +76,11 @@ def robot_file(name: str) -> Path:
     Raises:
         SurgsimError: If there is no such robot, or its package has no such file.
     """
-    for found in (_files(_shipped(ROBOTS)), _on_path(), _files(_shipped(TEST_ARMS))):
+    for found in (_files(_shipped(ROBOTS)), on_path(SEARCH_PATH), _files(_shipped(TEST_ARMS))):
         if name in found:
             return found[name]
     if name in (offered := offers(GROUP)):
-        return _of_package(name, offered[name].place, offered[name].origin)
+        return file_of_package("robot", offered[name])
     raise SurgsimError(unknown_name(name, "robot", robot_names()))
 
 
@@ -108,9 +108,16 @@ def _shipped(kind: str) -> Path:
     return resource_dir("assets") / kind
 
 
-def _on_path() -> dict[str, Path]:
+def brought_robot(name: str) -> Offer | None:
+    """What package brings the robot of that name; None where it is shipped or on the search path."""
+    hidden = is_shipped(name) or name in on_path(SEARCH_PATH)
+    return None if hidden else offers(GROUP).get(name)
+
+
+def on_path(variable: str) -> dict[str, Path]:
+    """Name to the MJCF of what is in the folders that an environment variable lists; the first counts."""
     found: dict[str, Path] = {}
-    for folder in os.environ.get(SEARCH_PATH, "").split(os.pathsep):
+    for folder in os.environ.get(variable, "").split(os.pathsep):
         for name, file in _files(Path(folder)).items() if folder else ():
             found.setdefault(name, file.absolute())
     return found
@@ -130,12 +137,18 @@ def _found(folder: Path) -> Iterator[tuple[str, Path]]:
 
 
 @lru_cache(maxsize=32)
-def _of_package(name: str, place: str, origin: str) -> Path:
+def file_of_package(what: str, offer: Offer) -> Path:
+    """The MJCF `NAME.xml` in the folder of the package that an offer names; `what` it is, for messages.
+
+    Raises:
+        SurgsimError: If there is no such package, or no such file in it.
+    """
+    name, label = offer.name, f"{what} '{offer.name}' {offer.origin}"
     try:
-        found = importlib.util.find_spec(place)
+        found = importlib.util.find_spec(offer.place)
     except (ImportError, ValueError) as error:
-        raise SurgsimError(f"robot '{name}' {origin} is not found: {error}") from error
+        raise SurgsimError(f"{label} is not found: {error}") from error
     for folder in (found.submodule_search_locations or []) if found else []:
         if (file := Path(folder) / f"{name}.xml").is_file():
             return file
-    raise SurgsimError(f"robot '{name}' {origin}: there is no {name}.xml in {place}")
+    raise SurgsimError(f"{label}: there is no {name}.xml in {offer.place}")

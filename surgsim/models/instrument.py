@@ -31,7 +31,7 @@ def instrument_spec(config: InstrumentConfig) -> mujoco.MjSpec:
 
     Its origin is at the flange, or at the end of the holder.
     """
-    if config.mjcf is not None:
+    if config.of_file:
         return tool_spec(config.tool)
     spec = asset(f"instruments/{config.type}.xml")
     _set_inertia(spec.body("instrument"), config)

@@ -287,6 +287,7 @@ class DynamicPlant:
             q=world.q.copy(),
             v=world.v.copy(),
             p_WT=world.p_WT.copy(),
+            p_WS=world.p_WS.copy(),
             p_WR=world.p_WR.copy(),
             p_WC=world.p_WC.copy(),
             f_C=world.f_C.copy() if self._scene.wall is not None else NOWHERE,

@@ -129,6 +129,7 @@ class KinematicPlant:
             q=world.q.copy(),
             v=world.v.copy(),
             p_WT=world.p_WT.copy(),
+            p_WS=world.p_WS.copy(),
             p_WR=world.p_WR.copy(),
             p_WC=world.p_WC.copy(),
             contact=self.watch.look(world.p_WC),

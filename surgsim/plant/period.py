@@ -90,8 +90,9 @@ def see_arm(world: World) -> None:
         world.q[i] = world.q_m[i] = qpos[world.first_qpos + i]
         world.v[i] = world.v_m[i] = qvel[world.first_dof + i]
     tip, wrist = site_place(world, world.tip), site_place(world, world.entry)
+    end = site_place(world, world.shaft_end)
     for i in range(3):
-        world.p_WT[i], world.p_WR[i] = tip[i], wrist[i]
+        world.p_WT[i], world.p_WS[i], world.p_WR[i] = tip[i], end[i], wrist[i]
         world.p_WC[i] = math.nan if world.trocar < 0 else site_place(world, world.trocar)[i]
         world.p_WC_m[i], world.v_WC_m[i] = world.p_WC[i], 0.0
     world.tracked_samples = 0

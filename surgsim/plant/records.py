@@ -28,7 +28,7 @@ def world_of(
     world.first_qpos, world.first_dof = span(scene.qpos_ids).start, span(scene.dof_ids).start
     world.first_ctrl = span(scene.actuator_ids).start
     world.first_joint = int(model.dof_jntid[scene.dof_ids[0]])
-    world.tip, world.entry = scene.tip_site, scene.shaft_entry_site
+    world.tip, world.entry, world.shaft_end = scene.tip_site, scene.shaft_entry_site, scene.shaft_end_site
     world.trocar = -1 if scene.trocar_site is None else scene.trocar_site
     world.mocap = -1 if scene.port_mocap is None else scene.port_mocap
     world.jaws = scene.parts.find(mujoco.mjtObj.mjOBJ_BODY, "jaws")

@@ -23,12 +23,12 @@ _LEAST = 1e-12
 
 @compiled
 def _vertex(world: World, joints: int, k: int, out: Array) -> None:
-    """End k of the pieces (3,) [m]: the entry, the hinges, the tip."""
+    """End k of the pieces (3,) [m]: the entry, the hinges, the shaft's end."""
     for i in range(3):
         if k == 0:
             out[i] = site_place(world, world.entry)[i]
         elif 2 * k > joints:
-            out[i] = site_place(world, world.tip)[i]
+            out[i] = site_place(world, world.shaft_end)[i]
         else:
             anchors = doubles(world.xanchor, world.njnt, 3)
             out[i] = anchors[world.first_joint + world.q.size + 2 * (k - 1), i]
@@ -43,7 +43,7 @@ def shaft_line(world: World, joints: int, point: Array, entry: Array, tip: Array
         joints: Of the shaft; 0: it is stiff.
         point: p (3,) [m].
         entry: Filled.
-        tip: Filled.
+        tip: Filled: the shaft's end.
 
     Returns:
         How many of the shaft's joints move the piece.
@@ -107,6 +107,18 @@ def see_bent(world: World, joints: int) -> None:
         world.p_WR[i] = world.p_WT[i] + length * to[i]
 
 
+@compiled
+def nearest_of_shaft(world: World, out: Array) -> None:
+    """Fill `out` (3,) [m] with the point of a stiff shaft's axis that is nearest to the trocar."""
+    along = scratch(3)
+    _direction(world.p_WR, world.p_WS, along)
+    s = 0.0
+    for i in range(3):
+        s += (world.p_WC[i] - world.p_WS[i]) * along[i]
+    for i in range(3):
+        out[i] = world.p_WS[i] + s * along[i]
+
+
 def bend_joints(scene: Scene) -> int:
     """Number of the shaft's joints, which must follow the arm's.
 
@@ -153,12 +165,12 @@ def lateral_masses(scene: Scene, places: Array, h: float) -> Array:
 
 
 def place_on_shaft(scene: Scene, back_m: float) -> tuple[int, int, float]:
-    """A point of the shaft's axis, `back_m` [m] from the tip.
+    """A point of the shaft's axis, `back_m` [m] from its end.
 
     Returns:
         The body that it is on, a site there whose z is the axis, and the way back from the site [m].
     """
-    model, site, left = scene.model, scene.tip_site, back_m
+    model, site, left = scene.model, scene.shaft_end_site, back_m
     body = int(model.site_bodyid[site])
     for k in range(bend_joints(scene) // 2, 0, -1):
         length = float(model.site_pos[site][2])

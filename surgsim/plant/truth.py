@@ -33,6 +33,7 @@ class Truth:
         q: Joint positions (n,) [rad].
         v: Joint velocities (n,) [rad/s].
         p_WT: Tip (3,) [m].
+        p_WS: End of the shaft: the tip of a straight instrument (3,) [m].
         p_WR: Wrist: the shaft's second point (3,) [m].
         p_WC: Trocar: the incision at rest, breathing included (3,) [m]; NaN without one.
         f_C: Force of the shaft on the abdominal wall (3,) [N]; NaN without a physical wall.
@@ -44,6 +45,7 @@ class Truth:
     q: Array
     v: Array
     p_WT: Array
+    p_WS: Array
     p_WR: Array
     p_WC: Array
     f_C: Array = field(default_factory=lambda: NOWHERE)

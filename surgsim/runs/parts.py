@@ -1,5 +1,6 @@
 """Which other packages gave a part to a run, and which file its policy stands in."""
 
+import importlib
 import sys
 from collections.abc import Iterable, Iterator
 from functools import cache
@@ -18,7 +19,10 @@ from surgsim.control.torque_laws.external import ExternalLawConfig
 from surgsim.errors import SurgsimError
 from surgsim.metrics.outside import GROUP as METRICS
 from surgsim.models.arm import ArmModel
-from surgsim.plugins import all_offers, offers
+from surgsim.models.config import InstrumentConfig, RobotConfig
+from surgsim.models.folders import brought_robot
+from surgsim.models.instrument_files import brought_instrument
+from surgsim.plugins import Offer, all_offers, offers
 from surgsim.runs.sources import hash_of, package_sha256
 from surgsim.scenario.arms import Experiment, each_arm
 from surgsim.scenario.schema import Scenario
@@ -27,13 +31,18 @@ from surgsim.scenario.schema import Scenario
 def plugins_of(scenario: Experiment) -> dict[str, dict[str, Any]]:
     """Version and hash of the sources of each other package that gave `scenario` a part, or its run a metric.
 
-    A module that belongs to no installed package has no version.
+    Robots and instruments with a name are parts too. A module that belongs to no installed package has no
+    version.
     """
     found = {}
     for part in _parts(scenario):
         for module in _modules(part):
             package = module.partition(".")[0]
             if package != "surgsim" and (told := _told(package)):
+                found[package] = told
+        if (offer := _brought(part)) is not None:
+            importlib.import_module(package := offer.place.partition(".")[0])
+            if told := _told(package):
                 found[package] = told
     for offer in offers(METRICS).values():
         package = offer.place.partition(":")[0].partition(".")[0]
@@ -110,6 +119,15 @@ def _modules(part: PartConfig) -> Iterator[str]:
     yield type(part).__module__
     if isinstance(part, PolicyConfig):
         yield _home(_policy(part.name))
+
+
+def _brought(part: PartConfig) -> Offer | None:
+    """What brings the robot or the instrument that a part names; None where no other package does."""
+    if isinstance(part, RobotConfig) and part.name is not None:
+        return brought_robot(part.name)
+    if isinstance(part, InstrumentConfig) and part.name is not None:
+        return brought_instrument(part.name)
+    return None
 
 
 def _policy(name: str) -> Any:

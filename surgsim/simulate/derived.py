@@ -44,6 +44,7 @@ def derive(model: Model, rows: Array, at: Ids) -> int:
     """Fill the errors of tip and RCM [m] and the manipulability in every row; NaN where what they need is.
 
     The RCM error is the trocar's distance from the shaft's line: |(p_WC - p_WT) x a| with the unit axis a.
+    Where the tip is angled, it is that from the point in the columns `wrist`, which is then the nearest one.
     """
     reach, axis, off = scratch(3), scratch(3), scratch(3)
     for k in range(rows.shape[0]):
@@ -58,6 +59,9 @@ def derive(model: Model, rows: Array, at: Ids) -> int:
         for i in range(3):
             axis[i] = axis[i] / length if length > 0.0 else math.nan
         cross(reach, axis, off)
+        if model.angled:
+            for i in range(3):
+                off[i] = row[at[TROCAR] + i] - row[at[WRIST] + i]
         row[at[RCM_ERROR]] = norm(off)
         mu, whole = manipulabilities(model, row[at[Q] : at[Q] + model.q.size])
         row[at[MU]], row[at[MU_6D]] = mu, whole

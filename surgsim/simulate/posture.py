@@ -54,7 +54,7 @@ class _Solver:
         ]
         self._rows: list[RcmTask] = []
         if reach.p_WC is not None:
-            self._rows.append(RcmTask(scene.tip_site, scene.model.nv))
+            self._rows.append(RcmTask(scene.shaft_end_site, scene.model.nv))
             self._rows[0].target = reach.p_WC
 
     def solve(self, p_WT: Array, q: Array, posture: Array, iterations: int) -> Array:

@@ -131,7 +131,7 @@ class SafetyMonitor:
     def _error_ending(self, t_s: float, truth: Truth, command: TipCommand) -> Ending | None:
         limit = self._c.rcm_error_max_m
         if limit is not None and self._has_trocar:
-            error = shaft_distance(truth.p_WC, truth.p_WT, truth.p_WR)
+            error = shaft_distance(truth.p_WC, truth.p_WS, truth.p_WR)
             if error > limit:
                 text = f"shaft {1e3 * error:.2f} mm from the trocar, limit {1e3 * limit:.2f} mm"
                 return Ending(outcome=Outcome.RCM_LIMIT, t_s=t_s, detail=text)
@@ -168,7 +168,7 @@ def is_safe(guard: Guard, watch: Watch, world: World, command: Command) -> bool:
         square += (world.p_WT[i] - command.p_WTd[i]) * (world.p_WT[i] - command.p_WTd[i])
     if math.sqrt(square) > guard.tip_m:
         return False
-    if guard.rcm_m < math.inf and shaft_distance(world.p_WC, world.p_WT, world.p_WR) > guard.rcm_m:
+    if guard.rcm_m < math.inf and shaft_distance(world.p_WC, world.p_WS, world.p_WR) > guard.rcm_m:
         return False
     if norm(world.f_C) > guard.wall_n or norm(world.f_T) > guard.touch_n:
         return False

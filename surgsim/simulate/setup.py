@@ -130,7 +130,7 @@ def _build_task(scenario: Scenario, start: Array) -> Task:
     """The task, its path beginning at `start` (3,) [m].
 
     Raises:
-        SurgsimError: If it enters a port and there is none, or starts beside it.
+        SurgsimError: If it enters a port and there is none, or starts beside it, or with an angled tip.
     """
     config, period = scenario.task, scenario.simulation.control_period_s
     if not _enters(config):
@@ -140,6 +140,11 @@ def _build_task(scenario: Scenario, start: Array) -> Task:
         return task
     if scenario.trocar is None:
         raise SurgsimError(f"{scenario.name}: task '{config.type}' needs a trocar")
+    if scenario.instrument is not None and scenario.instrument.tip_from_shaft_m[0] > 0.0:
+        raise SurgsimError(
+            f"{scenario.name}: task '{config.type}' takes the tip along the port's axis, where the shaft is: "
+            "the instrument's tip is off the shaft's line"
+        )
     try:
         return config.build(start, period, scenario.task_seed(), trocar=scenario.trocar)
     except ValueError as error:

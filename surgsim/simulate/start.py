@@ -1,5 +1,6 @@
 """Start configuration: can the instrument follow its path through the trocar, and from which joints?"""
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -140,13 +141,21 @@ def _above_port(p: Array, trocar: TrocarConfig) -> bool:
 def _outside_port(p: Array, instrument: InstrumentConfig, trocar: TrocarConfig) -> str | None:
     """Why a tip at `p` (3,) [m] is no pose through the port, or None."""
     r = p - np.array(trocar.position_m)
-    depth = float(np.linalg.norm(r))
+    away = float(np.linalg.norm(r))
     axis = unit(np.array(trocar.axis))
+    beside, past = instrument.tip_from_shaft_m
+    if away > 0.0 and away <= math.hypot(beside, past):
+        return f"it is {away:.4f} m from the trocar: the shaft's end would be outside the patient"
+    depth = math.sqrt(away * away - beside * beside) - past if beside or past else away
     if depth > instrument.shaft_length_m:
-        return f"it is {depth:.3f} m from the trocar, but the shaft is {instrument.shaft_length_m:.3f} m long"
-    if depth == 0.0 or r @ axis >= 0.0:
+        inside = f"it is {away:.3f} m from the trocar"
+        if beside or past:
+            inside = f"the shaft would be {depth:.3f} m in the patient"
+        return f"{inside}, but the shaft is {instrument.shaft_length_m:.3f} m long"
+    if away == 0.0 or r @ axis >= 0.0:
         return f"it is outside the patient, {r @ axis:.3f} m above the port"
-    inclination = float(np.arccos(np.clip(-(r @ axis) / depth, -1.0, 1.0)))
+    turned = math.asin(beside / away)  # the tip's direction from the port is so far off the shaft's
+    inclination = float(np.arccos(np.clip(-(r @ axis) / away, -1.0, 1.0))) - turned
     if inclination > MAX_INCLINATION_RAD:
         return (
             f"the shaft would be inclined {np.rad2deg(inclination):.0f} deg to the port's axis, more than "

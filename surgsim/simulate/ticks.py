@@ -16,6 +16,7 @@ from surgsim.compiled import call_at, compiled
 from surgsim.control.decision import ESTIMATOR, INSTRUMENT, decide, forget, measure
 from surgsim.plant.bore import Bore
 from surgsim.plant.contacts import Watch
+from surgsim.plant.shaft import nearest_of_shaft
 from surgsim.plant.world import Hooks
 from surgsim.simulate.safety import Guard, is_safe
 from surgsim.simulate.stop import Stop, brake
@@ -166,6 +167,8 @@ def _begin_row(run: Run, world: World, values: Array) -> Array:
     _put(row, at.v, world.v)
     _put(row, at.tip, world.p_WT)
     _put(row, at.wrist, world.p_WR)
+    if world.shaft_end != world.tip and world.trocar >= 0:
+        nearest_of_shaft(world, row[at.wrist : at.wrist + 3])
     _put(row, at.trocar, world.p_WC)
     row[at.infeasible] = 0.0
     row[at.stopped] = 0.0

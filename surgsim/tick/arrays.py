@@ -141,6 +141,8 @@ class Model(Record):
         site: The tip's site.
         nbody: Bodies.
         corrected: 1 where `p_NT` and `R_NT` count, else 0.
+        angled: 1 where the tip is not the shaft's end, else 0.
+        p_TS: The shaft's end in the tip's frame (3,) [m].
         p_NT: Corrected tip in the nominal tip's frame (3,) [m].
         R_NT: Its orientation there (3, 3).
         q: Joint positions of the evaluation (n,) [rad].
@@ -149,6 +151,8 @@ class Model(Record):
         R_WT: Tip orientation (3, 3); its third column is the shaft axis.
         Jv_WT: Translational tip Jacobian (3, n) [m/rad].
         Jw_WT: Rotational tip Jacobian (3, n).
+        p_WS: Place of the shaft's end (3,) [m]: the tip of a straight instrument.
+        Jv_WS: Its translational Jacobian (3, n) [m/rad].
         z_W: Joint axes as rows (n, 3), unit.
         anchors_W: Points on the joint axes as rows (n, 3) [m].
         M: Joint-space inertia with armature (n, n) [kg m^2].
@@ -157,6 +161,7 @@ class Model(Record):
     """
 
     SHAPES: ClassVar[dict[str, str]] = {
+        "p_TS": "3",
         "p_NT": "3",
         "R_NT": "3 3",
         "q": "n",
@@ -165,6 +170,8 @@ class Model(Record):
         "R_WT": "3 3",
         "Jv_WT": "3 n",
         "Jw_WT": "3 n",
+        "p_WS": "3",
+        "Jv_WS": "3 n",
         "z_W": "n 3",
         "anchors_W": "n 3",
         "M": "n n",
@@ -187,6 +194,8 @@ class Model(Record):
     site: int
     nbody: int
     corrected: int
+    angled: int
+    p_TS: Array
     p_NT: Array
     R_NT: Array
     q: Array
@@ -195,6 +204,8 @@ class Model(Record):
     R_WT: Array
     Jv_WT: Array
     Jw_WT: Array
+    p_WS: Array
+    Jv_WS: Array
     z_W: Array
     anchors_W: Array
     M: Array
@@ -211,7 +222,7 @@ class Seen(Record):
         first: 1 at the first tick after a reset, else 0: the memory is all zeros then.
         has_trocar: 1 with a trocar, else 0 and nothing is said of it.
         rows: RCM rows: 2, or 0 without a trocar.
-        depth: Insertion depth [m].
+        depth: Insertion depth of the shaft [m].
         roll_rate: Commanded turn about the shaft [rad/s].
         jaw: How far the jaws close, from 0 to 1.
         budget_j: Energy that may be given to the surroundings in this period [J]; infinite: no limit.
@@ -231,6 +242,8 @@ class Seen(Record):
         R_WT: Tip orientation (3, 3); its third column is the shaft axis.
         Jv_WT: Translational tip Jacobian (3, n) [m/rad].
         Jw_WT: Rotational tip Jacobian (3, n).
+        p_WS: Place of the shaft's end (3,) [m]: the tip of a straight instrument.
+        Jv_WS: Its translational Jacobian (3, n) [m/rad].
         z_W: Joint axes as rows (n, 3), unit.
         anchors_W: Points on the joint axes as rows (n, 3) [m].
         M: Inertia with armature (n, n) [kg m^2]; not filled on the kinematic plant.
@@ -314,6 +327,8 @@ class Seen(Record):
     R_WT: Array
     Jv_WT: Array
     Jw_WT: Array
+    p_WS: Array
+    Jv_WS: Array
     z_W: Array
     anchors_W: Array
     M: Array
@@ -547,6 +562,7 @@ class World(Record):
         first_joint: Where its joints begin.
         tip: Site of the tip.
         entry: Site of the shaft's entry.
+        shaft_end: Site of the shaft's end: the tip's of a straight instrument.
         trocar: Site of the trocar, or -1.
         jaws: Body of the jaws, or -1.
         mocap: The port's mocap row, or -1.
@@ -570,6 +586,7 @@ class World(Record):
         v: True joint velocities (n,) [rad/s].
         tau: Torque that the actuators gave over the last period (n,) [N m].
         p_WT: Tip (3,) [m].
+        p_WS: End of the shaft: the tip of a straight instrument (3,) [m].
         p_WR: A second point of the shaft axis (3,) [m].
         p_WC: Trocar, or NaN (3,) [m].
         f_C: Force of the shaft on the wall, or NaN (3,) [N].
@@ -591,7 +608,7 @@ class World(Record):
 
     SHAPES: ClassVar[dict[str, str]] = {
         **{name: "n" for name in ("tau_max", "torque", "qdot", "q", "v", "tau", "q_m", "v_m", "tau_m")},
-        **{name: "3" for name in ("p_WT", "p_WR", "p_WC", "f_C", "f_T", "p_WC_m", "v_WC_m", "f_T_m")},
+        **{name: "3" for name in ("p_WT", "p_WS", "p_WR", "p_WC", "f_C", "f_T", "p_WC_m", "v_WC_m", "f_T_m")},
         **{name: "3" for name in ("port_home", "port_offset", "port_velocity")},
         **{name: "3" for name in ("f_S_m", "m_S_m", "p_WT_m")},
         "R_WT_m": "3 3",
@@ -653,6 +670,7 @@ class World(Record):
     first_joint: int
     tip: int
     entry: int
+    shaft_end: int
     trocar: int
     jaws: int
     mocap: int
@@ -676,6 +694,7 @@ class World(Record):
     v: Array
     tau: Array
     p_WT: Array
+    p_WS: Array
     p_WR: Array
     p_WC: Array
     f_C: Array

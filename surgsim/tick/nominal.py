@@ -1,7 +1,7 @@
 """The nominal model of the arm, evaluated from compiled code."""
 
 from surgsim.compiled import compiled
-from surgsim.tick.algebra import cross
+from surgsim.tick.algebra import cross, dot
 from surgsim.tick.arrays import Array, Model, Seen
 from surgsim.tick.mujoco_calls import (
     mj_comPos,
@@ -43,6 +43,25 @@ def kinematics(model: Model, q: Array) -> None:
             model.anchors_W[i, k] = anchors[i, k]
     if model.corrected:
         _correct(model)
+    model.p_WS[:] = model.p_WT
+    model.Jv_WS[:] = model.Jv_WT
+    if model.angled:
+        _go_to_end(model)
+
+
+@compiled
+def _go_to_end(model: Model) -> None:
+    """The shaft's end, r from the tip: p_WS = p_WT + r,   Jv_WS = Jv_WT - [r]x Jw_WT,   r = R_WT p_TS."""
+    r, axis, moved = scratch(3), scratch(3), scratch(3)
+    for i in range(3):
+        r[i] = dot(model.R_WT[i], model.p_TS)
+        model.p_WS[i] += r[i]
+    for j in range(model.q.size):
+        for i in range(3):
+            axis[i] = model.Jw_WT[i, j]
+        cross(axis, r, moved)
+        for i in range(3):
+            model.Jv_WS[i, j] += moved[i]
 
 
 @compiled
@@ -94,6 +113,8 @@ def copy_model(a: Model | Seen, b: Model | Seen) -> None:
     b.R_WT[:] = a.R_WT
     b.Jv_WT[:] = a.Jv_WT
     b.Jw_WT[:] = a.Jw_WT
+    b.p_WS[:] = a.p_WS
+    b.Jv_WS[:] = a.Jv_WS
     b.z_W[:] = a.z_W
     b.anchors_W[:] = a.anchors_W
     b.M[:] = a.M

@@ -249,6 +249,7 @@ def test_list_prints_names_with_descriptions(capsys, kind):
         ("plants", {"dynamic", "kinematic"}),
         ("controllers", {"vprnn"}),
         ("robots", {"lwr4plus"}),
+        ("instruments", {"endoscope_0", "endoscope_30", "hook_30"}),
         ("tasks", {"circle", "sinusoid", "spiral"}),
         ("resolvers", {"vprnn"}),
         ("torque-laws", {"hierarchical_impedance"}),

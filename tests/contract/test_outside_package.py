@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from angled import HOOK
 
 from surgsim.plugins import GROUPS
 
@@ -446,3 +447,35 @@ def test_a_package_installed_from_its_wheel(surgsim, tmp_path):
     assert done.returncode == 0, done.stdout + done.stderr
     assert done.stdout.startswith("wheel-lab: 1 part, 10 checks, none broken\n")
     assert "resolver my_resolver" in done.stdout
+
+
+def test_a_package_brings_an_instrument_that_a_scenario_names(surgsim, tmp_path):
+    """It is listed, keeps its promises, runs, and stands with its package in the provenance."""
+    for name, text in {"my_hook": HOOK.read_text(), "bad_hook": "<mujoco><worldbody/></mujoco>"}.items():
+        folder = tmp_path / "site" / "lab_tools" / name
+        folder.mkdir(parents=True)
+        (folder / "__init__.py").write_text("")
+        (folder / f"{name}.xml").write_text(text)
+    (tmp_path / "site" / "lab_tools" / "__init__.py").write_text("")
+    points = "my_hook = lab_tools.my_hook\nbad_hook = lab_tools.bad_hook\nlost = lab_tools.nowhere\n"
+    install(tmp_path / "site", "lab-tools", f"[surgsim.instruments]\n{points}")
+    listed = json.loads(surgsim("list", "instruments", "--json").stdout)
+    said = {item["name"]: item["description"] for item in listed}
+    assert said["my_hook"].startswith("Electrocautery hook")
+    assert "instrument 'lost' of the package lab-tools 1.0" in said["lost"]
+    rows = json.loads(surgsim("test-part", "lab-tools", "--json").stdout)
+    assert all(row["passed"] for row in rows if row["part"] == "my_hook")
+    assert {row["part"] for row in rows if not row["passed"]} == {"bad_hook", "lost"}
+    assert {row["kind"] for row in rows} == {"instrument"}
+    refused = surgsim("check", "circle_lwr4plus", "--set", "instrument={name: bad_hook}")
+    assert refused.returncode == 2
+    assert "instrument 'bad_hook' of the package lab-tools 1.0: " in refused.stderr
+    assert refused.stderr.count("\n") == 1
+    short = ("--set", "task.duration_s=2.0", "--set", "task.radius_m=0.005")
+    words = ("--set", "instrument={name: my_hook}", "--controller", "rcm_inverse_dynamics", "--out", "run")
+    done = surgsim("run", "circle_lwr4plus", *short, *words, "--no-record")
+    assert done.returncode == 0, done.stderr
+    files = [json.loads(file.read_text()) for file in (tmp_path / "run").rglob("*.json")]
+    told = next(file["provenance"]["plugins"] for file in files if "provenance" in file)
+    assert told["lab_tools"]["version"] == "1.0"
+    assert re.fullmatch("[0-9a-f]{64}", told["lab_tools"]["sources_sha256"])

@@ -11,7 +11,7 @@ def _seen(arm, rng, depth, sideways=0.0):
     """A shaft whose tip is `depth` below the port."""
     seen = new_seen(arm, dt_s=0.001, has_trocar=True)
     kin = arm.kinematics(arm.limits.q_min + rng.uniform(0.3, 0.7, 7) * (arm.limits.q_max - arm.limits.q_min))
-    seen.p_WT[:], seen.R_WT[:] = kin.p_WT, kin.R_WT
+    seen.p_WT[:], seen.R_WT[:], seen.p_WS[:] = kin.p_WT, kin.R_WT, kin.p_WS
     seen.p_WC[:] = kin.p_WT - depth * kin.R_WT[:, 2] + sideways * kin.R_WT[:, 0]
     return seen
 

@@ -18,7 +18,12 @@ from surgsim.tasks.base import TimedTask, TipCommand
 SAFE = SafetyConfig(rcm_error_max_m=0.01, tip_error_max_m=0.02, trocar_force_max_n=5.0, tip_force_max_n=2.0)
 TIP = np.array([0.0, 0.0, -0.2])
 TRUTH = Truth(
-    q=np.zeros(7), v=np.zeros(7), p_WT=TIP, p_WR=np.array([0.0, 0.0, 0.2]), p_WC=np.array([0.006, 0.008, 0.0])
+    q=np.zeros(7),
+    v=np.zeros(7),
+    p_WT=TIP,
+    p_WS=TIP,
+    p_WR=np.array([0.0, 0.0, 0.2]),
+    p_WC=np.array([0.006, 0.008, 0.0]),
 )
 COMMAND = TipCommand(p_WTd=np.array([0.0, 0.02, -0.2]), v_WTd=np.zeros(3), a_WTd=np.zeros(3))
 

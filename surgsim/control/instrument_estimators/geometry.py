@@ -23,13 +23,13 @@ def parameters(n: int) -> int:
 
 
 @compiled
-def fill_columns(model: Model, bodies: Array, shaft_m: float, back_m: float, H: Array) -> None:
-    """Fill H (6, 7 n + 12), rows in the axes of the nominal tip: motion of a point of the shaft, and turn.
+def fill_columns(model: Model, bodies: Array, p_TA: Array, back_m: float, H: Array) -> None:
+    """Fill H (6, 7 n + 12), rows in the axes of the nominal tip: motion of a point behind the tip, and turn.
 
     Args:
         model: After `surgsim.tick.nominal.place`.
         bodies: Numbers of the base and of the body before each joint (1 + n,).
-        shaft_m: Distance of the shaft's entry from the tip [m].
+        p_TA: The shaft's entry in the nominal tip's frame (3,) [m].
         back_m: Distance of the point from the tip, along the shaft [m].
         H: Filled.
     """
@@ -51,8 +51,7 @@ def fill_columns(model: Model, bodies: Array, shaft_m: float, back_m: float, H: 
     for i in range(3):
         point[i] = 0.0
     entry = scratch(3)
-    entry[0] = entry[1] = 0.0
-    entry[2] = back_m - shaft_m
+    entry[0], entry[1], entry[2] = p_TA[0], p_TA[1], back_m + p_TA[2]
     _fill_frame(identity.reshape((3, 3)), point, identity, entry, H[:, 6 + 7 * n :])
 
 

@@ -1,7 +1,7 @@
 """Tracked: the arm's geometry learnt while it works, from an instrument that a tracker sees."""
 
 import math
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,8 +39,10 @@ class Tracked(Record):
         tool_walk_rad_per_sqrt_s: w_a.
         smoothing_s: T_f.
         ramp_s: T_r.
-        shaft_m: Distance of the shaft's entry from the tip [m].
+        p_TA: The shaft's entry in the nominal tip's frame (3,) [m].
     """
+
+    SHAPES: ClassVar[dict[str, str]] = {"p_TA": "3"}
 
     position_std_m: float
     angle_std_rad: float
@@ -49,7 +51,7 @@ class Tracked(Record):
     tool_walk_rad_per_sqrt_s: float
     smoothing_s: float
     ramp_s: float
-    shaft_m: float
+    p_TA: Array
 
 
 class Learnt(Record):
@@ -121,7 +123,7 @@ class TrackedInstrumentConfig(PartConfig):
         numbers = np.zeros(TRACKED_SIZE)
         record = laid_over(Tracked, numbers)
         take(record, self)
-        record.shaft_m = arm.shaft_length_m
+        record.p_TA[:] = arm.p_TA
         m = parameters(n)
         return KernelInstrumentEstimator(
             kernel=tracked_instrument,
@@ -185,7 +187,7 @@ def tracked_instrument(gains: Array, seen: Seen, memory: Array, out: Array) -> i
     if seen.tracked_samples > head.samples and age <= min(head.ticks, past.shape[0] - 1):
         _begin_sample(law, head, seen, P)
         place(seen.elsewhere, past[(head.ticks - age) % past.shape[0]])
-        fill_columns(seen.elsewhere, numbers, law.shaft_m, law.markers_from_tip_m, H)
+        fill_columns(seen.elsewhere, numbers, law.p_TA, law.markers_from_tip_m, H)
         _learn(law, seen, H, x, P, work)
     head.ticks += 1
     out[:] = 0.0
@@ -195,7 +197,7 @@ def tracked_instrument(gains: Array, seen: Seen, memory: Array, out: Array) -> i
             z[i] += share * (x[i] - z[i])
         let_in = _let_in(min((seen.t_s - head.begun_s) / law.ramp_s, 1.0))
         place(seen.elsewhere, seen.q)
-        fill_columns(seen.elsewhere, numbers, law.shaft_m, 0.0, H)
+        fill_columns(seen.elsewhere, numbers, law.p_TA, 0.0, H)
         for i in range(3):
             out[0, i], out[1, i] = let_in * dot(H[i], z), let_in * dot(H[3 + i], z)
     return GOES_ON

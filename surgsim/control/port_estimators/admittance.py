@@ -35,7 +35,7 @@ class PortAdmittanceConfig(PartConfig):
             `flange`, the force-torque sensor there.
         other_contact: With `flange`, where the shaft is touched beside the port: at the `tip`, or by a `hand`
             on the shaft's upper end. The forces of the two are told apart by their moments.
-        hand_from_tip_m: Distance of that hand from the tip [m].
+        hand_from_tip_m: Distance of that hand from the shaft's end [m].
         tare_s: The mean force over this first time is taken off; the shaft must hang free so long [s].
         most_m: Farthest that the remote centre may go from the trocar as seen [m].
         observer_hz: With `joints`, cut-off of the force estimate [Hz].

@@ -43,7 +43,7 @@ class HandsOnConfig(PartConfig):
         damping_n_s_per_m: D [N s/m].
         stiffness_n_per_m: K, that pulls the tip back to its path [N/m]; 0: it stays where it was led to.
         dead_zone_n: Forces of the hand below this move nothing [N].
-        hand_from_tip_m: Where the hand holds the shaft, from the tip [m].
+        hand_from_tip_m: Where the hand holds the shaft, from its end [m].
         least_depth_m: The lever from port to tip counts as at least this [m].
         tare_s: The mean force over this first time is taken off; nobody may hold the instrument so long [s].
         most_m: Farthest that the tip may be led from its path [m].

@@ -49,7 +49,9 @@ class MinkConfig(PartConfig):
         solver, gains = MinkSolver(self, arm), np.zeros(LAW_SIZE)
         law, n = laid_over(Law, gains), arm.limits.q_min.size
         law.k_tip, law.k_rcm = self.k_tip, self.k_rcm
-        law.mj_model, law.mj_data, law.qpos, law.site_xpos, law.site_xmat = solver.addresses
+        law.mj_model, law.mj_data, law.qpos, law.site_xpos, law.site_xmat, law.end_xpos, law.end_xmat = (
+            solver.addresses
+        )
         return KernelResolver(
             kernel=mink_velocity,
             arm=arm,
@@ -73,9 +75,13 @@ class Law(Record):
         qpos: Of the joint positions in them.
         site_xpos: Of the tip's place in them.
         site_xmat: Of its orientation.
+        end_xpos: Of the place of the shaft's end: the tip's of a straight instrument.
+        end_xmat: Of its orientation.
     """
 
-    ADDRESSES: ClassVar[frozenset[str]] = frozenset(("mj_model", "mj_data", "qpos", "site_xpos", "site_xmat"))
+    ADDRESSES: ClassVar[frozenset[str]] = frozenset(
+        ("mj_model", "mj_data", "qpos", "site_xpos", "site_xmat", "end_xpos", "end_xmat")
+    )
     head: Head
     k_tip: float
     k_rcm: float
@@ -84,6 +90,8 @@ class Law(Record):
     qpos: int
     site_xpos: int
     site_xmat: int
+    end_xpos: int
+    end_xmat: int
 
 
 LAW, LAW_SIZE = overlay(Law)
@@ -106,17 +114,18 @@ class MinkSolver:
         self._configuration = mink.Configuration(model)
         self._tip = mink.FrameTask("tip", "site", position_cost=config.tip_cost, orientation_cost=0.0)
         self._tip.set_target(mink.SE3.identity())
-        self._site = arm.scene.tip_site
-        self._rcm = RcmTask(self._site, model.nv)
+        self._sites = (arm.scene.tip_site, arm.scene.shaft_end_site)
+        self._rcm = RcmTask(arm.scene.shaft_end_site, model.nv)
         self._speeds = dict(zip(joint_names(model), arm.limits.velocity.tolist(), strict=True))
 
     @property
-    def addresses(self) -> tuple[int, int, int, int, int]:
-        """Of the configuration's model, its data, and in them of joint positions, tip's place and turn."""
+    def addresses(self) -> tuple[int, ...]:
+        """Of the configuration's model and data; of q in them, and of the frames of tip and shaft's end."""
         data, model = self._configuration.data, self._configuration.model
-        place, turn = data.site_xpos[self._site], data.site_xmat[self._site]
-        arrays = (data.qpos.ctypes.data, place.ctypes.data, turn.ctypes.data)
-        return model._address, data._address, *arrays
+        arrays = [data.qpos]
+        for site in self._sites:
+            arrays += [data.site_xpos[site], data.site_xmat[site]]
+        return model._address, data._address, *(array.ctypes.data for array in arrays)
 
     def join(self, seen: Fields, memory: Array) -> Callable[[], int]:
         """What the kernel enters to have mink's answer to the target and the RCM's shift in its memory."""
@@ -186,10 +195,11 @@ def _place(law: Law, seen: Seen) -> None:
     mj_kinematics(law.mj_model, law.mj_data)
     mj_comPos(law.mj_model, law.mj_data)
     tip, turn = vector(law.site_xpos, 3), doubles(law.site_xmat, 3, 3)
+    end, end_turn = vector(law.end_xpos, 3), doubles(law.end_xmat, 3, 3)
     for i in range(3):
-        tip[i] = seen.p_WT[i]
+        tip[i], end[i] = seen.p_WT[i], seen.p_WS[i]
         for k in range(3):
-            turn[i, k] = seen.R_WT[i, k]
+            turn[i, k] = end_turn[i, k] = seen.R_WT[i, k]
 
 
 def _examine(gains: Array, seen: Seen, memory: Array) -> Mapping[str, Array]:

@@ -181,11 +181,14 @@ def _head_for(gains: Array, seen: Seen, J: Array, goal: Array, z: Array, wanted:
 @compiled
 def _fill_bend(seen: Seen, qdot: Array, bend: Array) -> None:
     """Fill -J' q' of the rows (m,) [m/s^2]: what joint acceleration has to make up for at q' (n,)."""
-    linear, angular = scratch(3), scratch(3)
+    linear, angular, of_end = scratch(3), scratch(3), scratch(3)
     fill_velocity_products(seen.Jv_WT, seen.z_W, qdot, linear, angular)
     if bend.size > 3:
-        shaft, p, R, Jv, Jw = bend[3:], seen.p_WT, seen.R_WT, seen.Jv_WT, seen.Jw_WT
-        fill_rcm_bias(p, R, Jv, Jw, qdot, seen.p_WC, seen.v_WC, linear, angular, shaft)
+        of_end[:] = linear
+        if seen.elsewhere.angled:
+            fill_velocity_products(seen.Jv_WS, seen.z_W, qdot, of_end, angular)
+        shaft, p, R, Jv, Jw = bend[3:], seen.p_WS, seen.R_WT, seen.Jv_WS, seen.Jw_WT
+        fill_rcm_bias(p, R, Jv, Jw, qdot, seen.p_WC, seen.v_WC, of_end, angular, shaft)
     bend[:3] = linear
     for i in range(bend.size):
         bend[i] = -bend[i]

@@ -151,13 +151,13 @@ def _cross_rows(k2: float, seen: Seen, J: Array, v: Array) -> None:
     d, r, E, a, b = scratch(3), scratch(3), scratch(3), scratch(3), scratch(3)
     for i in range(3):
         d[i] = seen.R_WT[i, 2]
-        r[i] = seen.p_WT[i] - seen.p_WC[i]
+        r[i] = seen.p_WS[i] - seen.p_WC[i]
     cross(d, r, E)
     cross(d, seen.v_WC, a)
     for i in range(3):
         v[i] = a[i] - k2 * E[i]
     for j in range(J.shape[1]):
-        cross(d, np.ascontiguousarray(seen.Jv_WT[:, j]), a)
+        cross(d, np.ascontiguousarray(seen.Jv_WS[:, j]), a)
         cross(d, np.ascontiguousarray(seen.Jw_WT[:, j]), b)
         cross(r, b, b)
         for i in range(3):

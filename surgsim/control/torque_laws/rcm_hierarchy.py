@@ -81,9 +81,11 @@ def fill_task_errors(
         v_WC[i] = seen.v_WC[i] + late * seen.a_WC[i]
     moving, curved = scratch(2), scratch(2)
     normals = scratch_matrix(2, 3)
-    fill_rcm(model.p_WT, model.R_WT, model.Jv_WT, model.Jw_WT, p_WC, v_WC, error[3:], J[3:], moving, normals)
+    if model.angled:
+        fill_velocity_products(model.Jv_WS, model.z_W, model.v, linear, angular)
+    fill_rcm(model.p_WS, model.R_WT, model.Jv_WS, model.Jw_WT, p_WC, v_WC, error[3:], J[3:], moving, normals)
     fill_rcm_bias(
-        model.p_WT, model.R_WT, model.Jv_WT, model.Jw_WT, model.v, p_WC, v_WC, linear, angular, curved
+        model.p_WS, model.R_WT, model.Jv_WS, model.Jw_WT, model.v, p_WC, v_WC, linear, angular, curved
     )
     for i in range(2):
         rate[3 + i] = dot(J[3 + i], model.v) - moving[i]

@@ -58,7 +58,7 @@ class PushConfig(DisturbanceConfig):
         force_n: Force in the world frame [N].
         at: Where it acts: `tip`, `shaft` (a point of the shaft's axis), `elbow` (the link in the middle, the
             fourth of seven) or `wrist` (the last link but one).
-        distance_m: Of that point of the shaft from the tip [m]; without effect elsewhere.
+        distance_m: Of that point of the shaft from its end [m]; without effect elsewhere.
         start_s: When it begins [s].
         duration_s: How long it lasts [s].
         rise_s: Time of each of its edges [s].
@@ -101,5 +101,7 @@ class Push(Disturbance):
             links = link_names(scene.dof_ids.size)
             gains[BODY] = int(scene.parts.body(links[(len(links) - 1) // 2 if at == "elbow" else -2]).id)
             return
-        back = self._c.distance_m if at == "shaft" else 0.0
-        gains[BODY], gains[SITE], gains[DISTANCE] = place_on_shaft(scene, back)
+        if at == "tip":
+            gains[BODY], gains[SITE] = scene.model.site_bodyid[scene.tip_site], scene.tip_site
+            return
+        gains[BODY], gains[SITE], gains[DISTANCE] = place_on_shaft(scene, self._c.distance_m)

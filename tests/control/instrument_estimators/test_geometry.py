@@ -12,7 +12,7 @@ from surgsim.control.instrument_estimators.tracked import bodies
 from surgsim.control.seen import new_seen
 from surgsim.models.arm import ArmModel
 from surgsim.models.build import build
-from surgsim.models.config import RobotConfig, SceneConfig
+from surgsim.models.config import InstrumentConfig, RobotConfig, SceneConfig
 from surgsim.plant.disturbances.calibration_error import CalibrationError, CalibrationErrorConfig
 from surgsim.tick.nominal import place
 
@@ -54,10 +54,10 @@ def pose(scene, q, back):
 
 
 def columns(arm, q, back):
-    seen, n, shaft_m = new_seen(arm, dt_s=0.001, has_trocar=False), q.size, arm.shaft_length_m
+    seen, n = new_seen(arm, dt_s=0.001, has_trocar=False), q.size
     place(seen.elsewhere, q)
     H = np.full((6, parameters(n)), np.nan)
-    fill_columns(seen.elsewhere, bodies(arm), shaft_m, back, H)
+    fill_columns(seen.elsewhere, bodies(arm), arm.p_TA, back, H)
     return H
 
 
@@ -88,9 +88,12 @@ def differences(config, q, back):
 
 
 @pytest.mark.parametrize("back", [0.0, BACK])
-@pytest.mark.parametrize("name", ARMS)
-def test_columns_are_the_finite_differences_of_plants_with_the_errors(name, back):
-    config = SceneConfig(theatre=False, robot=RobotConfig(name=name, base_yaw_rad=0.7))
+@pytest.mark.parametrize(
+    ("name", "instrument"), [*((name, {}) for name in ARMS), ("panda", {"name": "hook_30"})]
+)
+def test_columns_are_the_finite_differences_of_plants_with_the_errors(name, instrument, back):
+    robot = RobotConfig(name=name, base_yaw_rad=0.7)
+    config = SceneConfig(theatre=False, robot=robot, instrument=InstrumentConfig(**instrument))
     arm = ArmModel(config)
     low, high = arm.limits.q_min, arm.limits.q_max
     q = np.random.default_rng(1).uniform(low, high)

@@ -178,3 +178,64 @@ def test_an_endoscopes_camera_goes_with_it_and_looks_off_its_shaft(angle):
     assert np.rad2deg(np.arccos(np.clip(looks @ turn[:, 2], -1.0, 1.0))) == pytest.approx(angle, abs=1e-5)
     if angle:
         assert looks @ turn[:, 1] == pytest.approx(0.5, abs=1e-6)
+
+
+BENT = TOOL.replace('<site name="end"', '<site name="shaft_end" pos="0 0 0.3"/><site name="end"')
+
+
+@pytest.mark.parametrize(
+    ("tip", "p_ST"), [("0.01 0 0.32", (0.01, 0.0, 0.02)), ("0 -0.015 0.3", (0.0, -0.015, 0.0))]
+)
+def test_a_tip_off_the_shaft_s_line_stays_where_the_file_has_it(tmp_path, tip, p_ST):
+    path = tmp_path / "bent.xml"
+    path.write_text(BENT.replace('name="end" pos="0 0 0.32"', f'name="end" pos="{tip}"'))
+    config = _config(mjcf=str(path), shaft_diameter_m=0.005, **SITES)
+    assert config.instrument.shaft_length_m == pytest.approx(0.28)
+    assert config.instrument.tip_from_shaft_m == pytest.approx((np.hypot(*p_ST[:2]), p_ST[2]), abs=1e-12)
+    arm = ArmModel(config)
+    kin = arm.kinematics(Q)
+    flange = ArmModel(SceneConfig(robot=ROBOT, instrument=None)).kinematics(Q)
+    angle = np.deg2rad(25.0)
+    turn = np.array([[np.cos(angle), 0, np.sin(angle)], [0, 1, 0], [-np.sin(angle), 0, np.cos(angle)]])
+    for found, place in ((kin.p_WS, [0.0, 0.0, 0.3]), (kin.p_WT, [float(x) for x in tip.split()])):
+        expected = flange.p_WT + flange.R_WT @ (np.array([0.03, 0.01, 0.05]) + turn @ place)
+        np.testing.assert_allclose(found, expected, atol=1e-12)
+    np.testing.assert_allclose(kin.R_WT[:, 2], flange.R_WT @ turn[:, 2], atol=1e-12)
+    assert not arm.rolls_shaft
+
+
+def test_a_shaft_s_end_at_the_tip_is_that_of_a_straight_instrument(tmp_path, tool):
+    path = tmp_path / "bent.xml"
+    path.write_text(BENT.replace('name="shaft_end" pos="0 0 0.3"', 'name="shaft_end" pos="0 0 0.32"'))
+    bent, straight = (
+        ArmModel(_config(mjcf=str(file), shaft_diameter_m=0.005, **SITES)) for file in (path, tool)
+    )
+    assert not bent.is_angled
+    np.testing.assert_array_equal(bent.kinematics(Q).Jv_WT, straight.kinematics(Q).Jv_WT)
+
+
+@pytest.mark.parametrize(
+    ("end", "tip", "reason"),
+    [
+        ('pos="0 0 0.02"', "0 0 0.32", "the shaft from site 'start' to site 'shaft_end' is 0.000 m long"),
+        (
+            'pos="0 0 0.3"',
+            "0.01 0 0.29",
+            "10.0 mm behind the shaft's end, site 'shaft_end': it would touch the",
+        ),
+        ('pos="0 0 0.3" euler="0 30 0"', "0.01 0 0.32", "has its z 30.0 deg off the shaft; it must be along"),
+        (
+            'pos="0 0 0.3"',
+            "0.15 0 0.3",
+            "is 0.150 m from the shaft's end, site 'shaft_end'; it must be at most 0.1 m",
+        ),
+    ],
+)
+def test_a_shaft_s_end_that_makes_no_sense_is_refused(tmp_path, end, tip, reason):
+    path = tmp_path / "bent.xml"
+    text = BENT.replace('name="shaft_end" pos="0 0 0.3"', f'name="shaft_end" {end}')
+    path.write_text(text.replace('name="end" pos="0 0 0.32"', f'name="end" pos="{tip}"'))
+    said = _refused(mjcf=str(path), **SITES)
+    assert reason in said
+    assert "\n" not in said
+    assert "no site 'no'" in _refused(mjcf=str(path), shaft_end_site="no", **SITES)
