@@ -154,7 +154,7 @@ def _lines(text: str) -> Iterator[list["_Quoted | str | None"]]:
             yield cells
             cells = []
     if cells:
-        raise ValueError("its last line has no end")
+        raise ValueError("it ends in the middle of a line")
 
 
 class _Quoted(str):
