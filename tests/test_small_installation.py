@@ -37,6 +37,13 @@ def test_every_package_that_is_left_out_has_its_line():
     assert all(PACKAGES[module][1] == "surgsim" for module in MODULES)
 
 
+def test_the_page_says_what_is_left_out():
+    page = (ROOT / "docs" / "installation.md").read_text(encoding="utf-8")
+    table = page.split("| left out | what does without |")[1].split("\n\n")[0]
+    named = [re.findall(r"`([\w-]+)`", row.split("|")[1]) for row in table.splitlines() if row]
+    assert sorted(name for row in named for name in row) == sorted(LEFT_OUT)
+
+
 @pytest.fixture(scope="module")
 def small(tmp_path_factory):
     """Runs the command in a folder of its own, where it and what it starts can import none of them."""
@@ -214,9 +221,9 @@ def test_an_import_that_fails_deeper_down_is_a_line_too(monkeypatch, capsys):
 
     monkeypatch.setattr("surgsim.cli.list.execute", fail)
     failing = "rerun.chunk"
-    assert main(["list"]) == 2
+    assert main(["list", "scenarios"]) == 2
     assert capsys.readouterr().err == "surgsim: this needs rerun-sdk: pip install surgsim\n"
     failing = "theirs"
     assert missing(ModuleNotFoundError(name=failing)) is None
     with pytest.raises(ModuleNotFoundError):
-        main(["list"])
+        main(["list", "scenarios"])
