@@ -63,8 +63,8 @@ docs: $(INSTALLED_DOCS)  ## build the documentation site into build/site; a warn
 	@cd '$(ROOT)' && "$(PY)" -m sphinx --quiet --fail-on-warning --keep-going --conf-dir docs . build/site
 	@echo 'open $(ROOT)/build/site/index.html'
 
-wheel: $(INSTALLED_DEV)  ## build the wheel into dist/
-	@cd '$(ROOT)' && "$(PY)" -m pip wheel --quiet --no-build-isolation --no-deps --wheel-dir dist .
+wheel: $(INSTALLED_DEV)  ## build the wheels into dist/: surgsim, and surgsim-core with fewer dependencies
+	@cd '$(ROOT)' && "$(PY)" -m pip wheel --quiet --no-build-isolation --no-deps --wheel-dir dist . ./core
 	@ls -l '$(ROOT)'/dist/*.whl
 
 clean:  ## remove build products and caches; .venv and runs stay
@@ -75,7 +75,7 @@ clean:  ## remove build products and caches; .venv and runs stay
 define install
 	@"$(PY)" -c '$(OLD_ENOUGH)'
 	@"$(PY)" -m pip --version > /dev/null 2>&1 || "$(PY)" -m ensurepip
-	@echo 'installing surgsim into $(VENV): about 1.3 GB, some minutes' >&2
+	@echo 'installing surgsim into $(VENV): about 1.5 GB, some minutes' >&2
 	@$(PIP_INSTALL) --quiet hatchling editables
 	@$(ALIVE) $(PIP_INSTALL) --no-build-isolation -e '$(1)' >&2
 	@rm -f '$(VENV)'/.surgsim-*

@@ -64,6 +64,13 @@ class PartConfig(BaseModel):
             ValueError: With the reason.
         """
 
+    def check_installed(self) -> None:
+        """Refuse a part that is built with a package which is not installed.
+
+        Raises:
+            MissingPackageError: With the package.
+        """
+
     def written_out(self, joints: int) -> Self:
         """The same part with the lists that null stands for, a number for each of the arm's `joints`."""
         return self

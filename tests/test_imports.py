@@ -11,6 +11,7 @@ import surgsim
 LAYERS = (
     "surgsim",
     "surgsim.errors",
+    "surgsim.packages",
     "surgsim.resources",
     "surgsim.compiling",
     "surgsim.compiled",
@@ -59,13 +60,13 @@ LAYERS = (
 # Who may import what, where it is not everyone.
 ONLY = {
     "rerun": ("surgsim.recording",),
-    "pandas": ("surgsim.api", "surgsim.trace"),
+    "pandas": ("surgsim.api", "surgsim.compare.columns", "surgsim.trace"),
     "pyarrow": (
         "surgsim.api",
-        "surgsim.compare",
+        "surgsim.compare.columns",
+        "surgsim.compare.table",
         "surgsim.export",
         "surgsim.recording",
-        "surgsim.studies",
     ),
     "av": ("surgsim.export.moving",),
     "mujoco": (
@@ -81,7 +82,7 @@ ONLY = {
         "surgsim.control.resolvers.mink",
     ),
     "glfw": ("surgsim.live.window",),
-    "mink": ("surgsim.bench.libraries.with_mink", "surgsim.control", "surgsim.simulate"),
+    "mink": ("surgsim.bench.libraries.with_mink", "surgsim.control"),
     "placo": ("surgsim.bench.libraries.with_placo",),
     "pink": ("surgsim.bench.libraries.with_pink",),
     "pinocchio": ("surgsim.bench.libraries.with_pink",),

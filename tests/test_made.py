@@ -5,9 +5,9 @@ import re
 import sys
 from pathlib import Path
 
-import pyarrow.parquet as pq
 import pytest
 
+from surgsim.compare.table import read_table
 from surgsim.scenario.load import shipped
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -53,8 +53,8 @@ def test_the_reference_runs_are_as_many_as_their_page_says():
     text = (ROOT / "results" / "leaderboard" / "README.md").read_text(encoding="utf-8")
     told = dict(re.findall(r"^\| `(\w+)/` \| .*? \| (\d+) \|", text, re.M))
     held = {
-        path.parent.name: str(pq.read_metadata(path).num_rows)
-        for path in (ROOT / "results" / "leaderboard").glob("*/runs.parquet")
+        path.parent.name: str(len(read_table(path.parent)))
+        for path in (ROOT / "results" / "leaderboard").glob("*/runs.csv")
     }
     assert told == held
 
@@ -62,7 +62,7 @@ def test_the_reference_runs_are_as_many_as_their_page_says():
 def test_what_the_results_say_of_our_controller_holds_in_the_rows():
     text = (ROOT / "docs" / "results.md").read_text(encoding="utf-8")
     said = re.search(r"same LWR4\+ scenarios: tip RMS at most ([\d.]+) mm, RCM max at most ([\d.]+) mm", text)
-    rows = pq.read_table(ROOT / "results/leaderboard/nominal/runs.parquet").to_pylist()
+    rows = read_table(ROOT / "results/leaderboard/nominal").rows()
     ours = [r for r in rows if r["controller"] == "rcm_inverse_dynamics" and "lwr4plus" in r["scenario"]]
     assert max(r["tip_error_rms_mm"] for r in ours) <= float(said[1])
     assert max(r["rcm_error_max_mm"] for r in ours) <= float(said[2])

@@ -6,9 +6,13 @@ import shutil
 import subprocess
 import sys
 import zipfile
+from email import message_from_bytes
+from email.message import Message
 from pathlib import Path
 
 import pytest
+from packaging.requirements import Requirement
+from packaging.utils import canonicalize_name
 
 from surgsim.scenario.drawn import drawn_names
 
@@ -52,6 +56,54 @@ def test_it_holds_every_module_asset_and_scenario(wheel: Path) -> None:
     assert (modules | data) - packed == set()
     assert "surgsim/py.typed" in packed
     assert not [name for name in packed if name.startswith(("tests/", "docs/")) or "__pycache__" in name]
+
+
+@pytest.fixture(scope="module")
+def small_wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The wheel of the small installation."""
+    folder = tmp_path_factory.mktemp("small")
+    source = ROOT / "core"
+    call(*PIP, "wheel", "--no-index", "--no-build-isolation", "--no-deps", "-w", folder, source, cwd=folder)
+    (built,) = folder.glob("surgsim_core-*.whl")
+    return built
+
+
+def metadata_of(wheel: Path) -> Message:
+    with zipfile.ZipFile(wheel) as file:
+        (name,) = (name for name in file.namelist() if name.endswith(".dist-info/METADATA"))
+        return message_from_bytes(file.read(name))
+
+
+def requirements_of(wheel: Path) -> dict[str, Requirement]:
+    """What the wheel needs without extras, by name."""
+    every = map(Requirement, metadata_of(wheel).get_all("Requires-Dist", []))
+    return {canonicalize_name(one.name): one for one in every if "extra" not in str(one.marker)}
+
+
+def test_the_small_wheel_holds_the_same_files(wheel: Path, small_wheel: Path) -> None:
+    with zipfile.ZipFile(wheel) as plain, zipfile.ZipFile(small_wheel) as small:
+        held = [
+            {one.filename: one.CRC for one in file.infolist() if ".dist-info/" not in one.filename}
+            for file in (plain, small)
+        ]
+        commands = [
+            file.read(next(name for name in file.namelist() if name.endswith("entry_points.txt")))
+            for file in (plain, small)
+        ]
+        assert any(name.endswith("licenses/LICENSE") for name in small.namelist())
+    assert held[0] == held[1]
+    assert commands[0] == commands[1]
+
+
+def test_the_small_wheel_needs_less_in_the_same_releases(wheel: Path, small_wheel: Path) -> None:
+    plain, small = requirements_of(wheel), requirements_of(small_wheel)
+    kept = {"mujoco" if name == "mujoco-core" else name: one.specifier for name, one in small.items()}
+    assert kept.items() < {name: one.specifier for name, one in plain.items()}.items()
+    left_out = {"rerun-sdk", "pyarrow", "dm-control", "dm-env", "mink", "matplotlib", "pillow"}
+    assert plain.keys() - kept.keys() == left_out | {"osqp", "qpsolvers"}
+    told, ours = metadata_of(wheel), metadata_of(small_wheel)
+    for field in ("Version", "Summary", "License-Expression", "Requires-Python"):
+        assert told[field] == ours[field]
 
 
 @pytest.fixture(scope="module")

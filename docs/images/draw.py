@@ -181,7 +181,7 @@ def main() -> int:
     draw_paths()
     draw_errors()
     concepts.main()
-    for folder in sorted(path.parent for path in tables.RESULTS.glob("*/runs.parquet")):
+    for folder in sorted(path.parent for path in tables.RESULTS.glob("*/runs.csv")):
         print(write_report(folder))
     try:
         for file in SCENES:

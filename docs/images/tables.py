@@ -14,8 +14,9 @@ from typing import Any
 
 import compared
 import numpy as np
-import pyarrow.parquet as pq
 from ruamel.yaml import YAML
+
+from surgsim.compare.table import read_table
 
 ROOT = Path(__file__).resolve().parents[2]
 RESULTS = ROOT / "results" / "leaderboard"
@@ -52,7 +53,7 @@ class Column:
 
 def rows_of(suite: str, scenario: str = "") -> Rows:
     """Runs of a suite, of one scenario if named."""
-    rows = pq.read_table(RESULTS / suite / "runs.parquet", partitioning=None).to_pylist()
+    rows = read_table(RESULTS / suite).rows()
     return [row for row in rows if scenario in ("", row["scenario"])]
 
 

@@ -1,5 +1,5 @@
 #!/bin/sh
-# Installs surgsim from a checkout into a prefix of its own: what the image's build does, step by step.
+# Installs surgsim, the small installation, from a checkout into a prefix of its own: what the image's build does, step by step.
 #
 #   sh install.sh SOURCE PREFIX [OPTIONS OF PIP]
 #
@@ -9,4 +9,4 @@ source=$1
 prefix=$2
 shift 2
 python3 -m venv "$prefix"
-"$prefix/bin/python" -m pip install --no-cache-dir --disable-pip-version-check -c "$source/constraints.txt" "$@" "$source"
+"$prefix/bin/python" -m pip install --no-cache-dir --disable-pip-version-check -c "$source/constraints.txt" "$@" "$source/core"

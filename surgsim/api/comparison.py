@@ -10,21 +10,22 @@ from textwrap import fill
 from typing import TYPE_CHECKING
 
 import numpy as np
-import pyarrow as pa
 
 from surgsim.api.leaderboard import Leaderboard
 from surgsim.api.run import Run, read_run
+from surgsim.compare.columns import Table
 from surgsim.compare.leaderboard import leaderboard
 from surgsim.compare.observations import Array, Observations
 from surgsim.compare.summary import summary
-from surgsim.compare.table import read_table
+from surgsim.compare.table import read_table, schema
 from surgsim.display import WIDTH, count, html_table, html_title, number, text_table
-from surgsim.errors import SurgsimError, not_held
+from surgsim.errors import not_held
 from surgsim.report.results import Results, results_of
 from surgsim.report.write import write_page
 
 if TYPE_CHECKING:
     import pandas as pd
+    import pyarrow as pa
 
 _SHOWN = {"tip_error_rms_mm": "tip error", "rcm_error_rms_mm": "RCM error"}
 """Metrics of the short table, with their headings: medians of the root mean squares [mm]."""
@@ -60,13 +61,13 @@ class Comparison(Mapping[str, Run]):
         ['circle_lwr4plus/pinv/base-seed0', 'circle_lwr4plus/qp/base-seed0']
         >>> found["circle_lwr4plus/qp/base-seed0"].outcome
         'completed'
-        >>> found.table.column("controller").to_pylist()
-        ['pinv', 'qp']
+        >>> found.table["controller"]
+        ('pinv', 'qp')
         >>> len(found.leaderboard("tip_error_rms_mm"))
         2
     """
 
-    def __init__(self, folder: Path, table: pa.Table, *, temporary: bool = False) -> None:
+    def __init__(self, folder: Path, table: Table, *, temporary: bool = False) -> None:
         self.folder = folder
         self.table = table
         self._keeper = _Keeper(folder) if temporary else None
@@ -95,8 +96,8 @@ class Comparison(Mapping[str, Run]):
 
     @cached_property
     def _folders(self) -> dict[str, str]:
-        columns = (self.table.column(name).to_pylist() for name in ("run_id", "folder"))
-        return dict(zip(*columns, strict=True))
+        pairs = zip(self.table["run_id"], self.table["folder"], strict=True)
+        return {str(run_id): str(folder) for run_id, folder in pairs}
 
     @cached_property
     def _results(self) -> Results:
@@ -122,12 +123,15 @@ class Comparison(Mapping[str, Run]):
         Raises:
             SurgsimError: If pandas is not installed.
         """
-        try:
-            import pandas  # noqa: F401 - pyarrow's own message does not say how to get it
-        except ModuleNotFoundError as error:
-            raise SurgsimError("to_pandas needs pandas: pip install 'surgsim[pandas]'") from error
-        frame: pd.DataFrame = self.table.to_pandas()
-        return frame
+        return self.table.to_pandas()
+
+    def to_arrow(self) -> "pa.Table":
+        """The table as one of pyarrow, null where a run has nothing.
+
+        Raises:
+            SurgsimError: If pyarrow is not installed.
+        """
+        return self.table.to_arrow(schema())
 
     def leaderboard(self, metric: str = "rcm_error_rms_mm") -> Leaderboard:
         """Controllers by one metric, the best mean rank first, with intervals and failures.

@@ -7,6 +7,7 @@ from typing import Any
 
 from surgsim.api.comparison import Comparison
 from surgsim.api.run import Run, read_run
+from surgsim.compare.unfinished import has_table
 from surgsim.errors import RecordingError
 from surgsim.recording.read import read_recording
 from surgsim.trace.trace import Trace
@@ -33,12 +34,12 @@ def read(path: str | os.PathLike[str], /) -> "Run | Comparison":
         True
     """
     place = Path(path)
-    if (place / "runs.parquet").is_file() or (place / "suite.json").is_file():
+    if has_table(place) or (place / "suite.json").is_file():
         return Comparison.of_folder(place)
     if (place / "metrics.json").is_file():
         return read_run(place)
     if place.is_dir() and not (place / "recording.rrd").is_file():
-        raise RecordingError(f"{place} holds neither a run nor a batch: no metrics.json, no runs.parquet")
+        raise RecordingError(f"{place} holds neither a run nor a batch: no metrics.json, no runs.csv")
     recorded = read_recording(place)
     return Run(_summary(recorded.trace, recorded.metrics), trace=recorded.trace)
 

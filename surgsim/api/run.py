@@ -10,6 +10,7 @@ from surgsim.api.metrics import Metrics
 from surgsim.display import WIDTH, html_title
 from surgsim.errors import RecordingError, SurgsimError
 from surgsim.metrics.catalog import of_one_arm
+from surgsim.packages import require
 from surgsim.recording.contents import check_contents
 from surgsim.recording.read import read_recording
 from surgsim.recording.sealed import read_sealed
@@ -181,6 +182,7 @@ class Run:
         """
         if self.trace.arms:
             raise SurgsimError(f"{self.name} has several arms: ask for arms['{self.trace.arms[0]}'].figure()")
+        require("figures need", "matplotlib")
         from surgsim.api.figure import figure_of  # matplotlib takes a while to import
 
         return figure_of(self)

@@ -12,7 +12,7 @@ from surgsim.cli.scenario_options import naming_file
 from surgsim.control.controller import ControllerConfig
 from surgsim.errors import UnreachableError
 from surgsim.runs.folder import execute, run_to_folder, summary_of_result
-from surgsim.runs.parts import check_externals
+from surgsim.runs.parts import check_parts
 from surgsim.scenario.arms import Experiment
 from surgsim.scenario.externals import externals_given
 from surgsim.scenario.load import Source, load_experiment
@@ -62,7 +62,7 @@ def run(
     checked = load_experiment(scenario, controller=controller, assignments=assignments, seed=seed)
     folder = None if out is None else Path(out)
     with externals_given(externals or {}):
-        check_externals([checked])
+        check_parts([checked])
         try:
             with _shown(checked, progress) as report:
                 if folder is None:

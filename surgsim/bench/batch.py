@@ -57,7 +57,7 @@ class _Measured:
                 suite=_suite(runs, duration_s), folder=Path(), out=Path(folder) / "out", jobs=workers
             )
             table = compare(batch, self._report)
-        if table is None or set(table["outcome"].to_pylist()) != {"completed"}:
+        if table is None or set(table["outcome"]) != {"completed"}:
             raise SurgsimError("bench: a run of the batch did not complete")
         self.runs_per_s = (runs - workers) / (self._ended_s - self._began_s)
         self.cpu_s = (_children_cpu_s() - before) / runs

@@ -48,7 +48,10 @@ def execute(options: argparse.Namespace) -> int:
     from surgsim.cli.output import show_count
     from surgsim.cli.table import print_prose, print_table
     from surgsim.models.adopted.file import kind_of
+    from surgsim.packages import require
 
+    if not options.quick:
+        require("the map of ports needs", "matplotlib", otherwise="--quick")
     robot, name = _robot(options, kind_of(options.file)), _checked_name(options)
     with show_count(f"trying ports of {name}", "ports", quiet=options.quick) as progress:
         adoption = adopt(robot, name, mapped=not options.quick, progress=progress)

@@ -75,7 +75,7 @@ def execute(options: argparse.Namespace) -> int:
             )
             return 1
         _print(table, options, suite.matters)
-        print_prose(f"{table.num_rows} runs; wrote {out / 'runs.parquet'} and runs.csv", sys.stderr)
+        print_prose(f"{len(table)} runs; wrote {out / 'runs.csv'}", sys.stderr)
         print_prose(f"wrote {write_report(out)}", sys.stderr)
     except Stopped as stopped:
         print_prose(f"surgsim: {stopped.told}; --resume --out {out} runs what is missing", sys.stderr)
@@ -92,7 +92,7 @@ def _tell_broken(table: Any) -> int:
     if not runs:
         return 0
     named = ", ".join(runs[:3]) + (f" and {len(runs) - 3} more" if len(runs) > 3 else "")
-    text = f"{len(runs)} of {table.num_rows} runs crashed or lost their worker: {named}"
+    text = f"{len(runs)} of {len(table)} runs crashed or lost their worker: {named}"
     print_prose(f"surgsim: {text}; outcome_detail in runs.csv says how", sys.stderr)
     return 1
 

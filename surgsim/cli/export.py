@@ -84,7 +84,16 @@ def execute(options: argparse.Namespace) -> int:
         draw_without_display()  # before anything imports MuJoCo
     from surgsim.errors import SurgsimError
     from surgsim.export.subjects import chosen, find
+    from surgsim.packages import ENVIRONMENT, RECORDING, require
 
+    for option, modules in (
+        ("figure", ("matplotlib",)),
+        ("video", (*RECORDING, "PIL", "OpenGL")),
+        ("lerobot", (*RECORDING, *ENVIRONMENT, "PIL")),
+        ("minari", (*RECORDING, *ENVIRONMENT)),
+    ):
+        if getattr(options, option):
+            require(f"--{option} needs", *modules)
     jobs = _jobs(options)
     if not jobs:
         raise SurgsimError(

@@ -52,12 +52,13 @@ def execute(options: argparse.Namespace) -> int:
     """Print what was asked for; 1 if metrics differ from those stored, or a run did not complete."""
     from surgsim.cli.inspect_folder import check_finished, check_recorded, list_batch, run_of
     from surgsim.cli.inspect_pair import inspect_two
+    from surgsim.compare.unfinished import has_table
     from surgsim.errors import SurgsimError
 
     for path in options.paths:
         check_finished(path)
     paths = [run_of(path, options.run) if options.run else path for path in options.paths]
-    if len(paths) == 1 and (paths[0] / "runs.parquet").is_file():
+    if len(paths) == 1 and has_table(paths[0]):
         list_batch(paths[0], options.json)
         return 0
     if len(paths) > 2:

@@ -87,7 +87,9 @@ def run_of(path: Path, run_id: str) -> Path:
     from surgsim.errors import SurgsimError, unknown_name
 
     table = read_table(path)
-    folders = dict(zip(table["run_id"].to_pylist(), table["folder"].to_pylist(), strict=True))
+    folders = {
+        str(found): str(folder) for found, folder in zip(table["run_id"], table["folder"], strict=True)
+    }
     if run_id not in folders:
         known = list(folders)[:20]
         raise SurgsimError(unknown_name(run_id, f"run of {path}", known))
@@ -108,7 +110,7 @@ def list_batch(path: Path, as_json: bool) -> None:
     from surgsim.display import number
     from surgsim.metrics.catalog import METRICS
 
-    rows = read_table(path).to_pylist()
+    rows = read_table(path).rows()
     if as_json:
         print(json.dumps(rows, indent=2))
         return

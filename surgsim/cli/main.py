@@ -17,6 +17,7 @@ from surgsim.cli.parser import Parser
 from surgsim.cli.scenario_options import externals_given
 from surgsim.cli.table import print_prose
 from surgsim.errors import SurgsimError
+from surgsim.packages import missing
 from surgsim.runs.stop import Stopped, stopping_in_order
 
 COMMANDS = (
@@ -98,6 +99,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 return int(options.execute(options))
     except SurgsimError as error:
         print_error(error)
+        return 2
+    except ModuleNotFoundError as error:
+        if (told := missing(error)) is None:
+            raise
+        print_error(told)
         return 2
     except Stopped as stopped:
         print(f"surgsim: {stopped.told}; nothing half done is left", file=sys.stderr)

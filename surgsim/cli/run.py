@@ -60,8 +60,9 @@ def execute(options: argparse.Namespace) -> int:
     from surgsim.cli.output import print_run, show_progress
     from surgsim.cli.table import print_prose
     from surgsim.errors import Outcome, SurgsimError, UnreachableError
-    from surgsim.runs.folder import run_to_folder
-    from surgsim.runs.parts import check_externals
+    from surgsim.packages import RECORDING, require
+    from surgsim.runs.folder import check_recordable, run_to_folder
+    from surgsim.runs.parts import check_parts
     from surgsim.scenario.load import load_experiment
 
     if options.live is not None and options.operator is not None:
@@ -71,8 +72,11 @@ def execute(options: argparse.Namespace) -> int:
     scenario = load_experiment(
         options.scenario, controller=options.controller, assignments=options.assignments, seed=options.seed
     )
-    check_externals([scenario])
+    check_parts([scenario])
     operator, record = options.operator, not options.no_record
+    check_recordable(record)
+    if options.live is not None:
+        require("--live needs", *RECORDING)
     name = f"{scenario.controller_name}-seed{scenario.seed}"
     folder = options.out or _default_folder(Path("runs") / scenario.name, name, operator)
     with show_progress(f"{scenario.name} {scenario.controller_name}", operator in _LIVE) as progress:

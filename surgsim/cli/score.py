@@ -99,11 +99,13 @@ def _one(options: argparse.Namespace) -> int:
         print_prose(f"{_store(options)}: other shards' runs are missing; the same command goes on")
         return 1
     write_score(out, found)
-    write_passport(out, found, baselines_of(found, others, wish.protocol), wish.protocol.config)
+    left_out = write_passport(out, found, baselines_of(found, others, wish.protocol), wish.protocol.config)
     if options.json:
         print(json.dumps(found.content, indent=2))
     else:
         print_score(found, wish.protocol.config)
+    if left_out:
+        print_prose(left_out, sys.stderr)
     print_prose(f"wrote {out / 'score.json'}, rows.jsonl and passport.html", sys.stderr)
     return _tell_broken([found])
 

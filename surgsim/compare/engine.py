@@ -8,21 +8,21 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import pyarrow as pa
-
 from surgsim.compare.axis import AxisConfig
+from surgsim.compare.columns import Table
 from surgsim.compare.job import Job
 from surgsim.compare.suite import RunSpec, SuiteConfig, check_runs, expand
 from surgsim.compare.table import Row, write_table
 from surgsim.compare.workers import Done, run_jobs
 from surgsim.errors import SurgsimError
+from surgsim.packages import RECORDING, require
 from surgsim.recording.contents import fault_of
 from surgsim.recording.files import replacing, write_file
 from surgsim.recording.folders import make_folder
 from surgsim.recording.sealed import read_sealed, sealed
 from surgsim.runs.drafts import clear_drafts
 from surgsim.runs.exchange import restore_all
-from surgsim.runs.parts import check_externals
+from surgsim.runs.parts import check_parts
 from surgsim.runs.provenance import code_difference, provenance, provenance_of
 from surgsim.scenario.arms import Experiment
 
@@ -54,7 +54,7 @@ class Batch:
     command: str = ""
 
 
-def compare(batch: Batch, report: Report | None = None, runner: Runner = run_jobs) -> pa.Table | None:
+def compare(batch: Batch, report: Report | None = None, runner: Runner = run_jobs) -> Table | None:
     """Run what is missing of a suite, and write its table once every run is whole.
 
     Returns:
@@ -65,7 +65,9 @@ def compare(batch: Batch, report: Report | None = None, runner: Runner = run_job
     """
     specs = expand(batch.suite, batch.folder)
     scenarios = check_runs(specs)
-    check_externals(scenarios)
+    check_parts(scenarios)
+    if any(spec.record for spec in specs):
+        require("recordings need", *RECORDING, otherwise="leave the recordings out")
     rows = [_row(batch.suite, spec, scenario) for spec, scenario in zip(specs, scenarios, strict=True)]
     _check_names(rows)
     _prepare(batch)

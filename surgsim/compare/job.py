@@ -4,8 +4,8 @@ import json
 import traceback
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
+from surgsim.compare.columns import Table
 from surgsim.control.external.given import given, giving
 from surgsim.errors import Outcome, SurgsimError
 from surgsim.runs.folder import execute, summary_of, whole_folder, write_run, write_summary
@@ -105,7 +105,7 @@ OUTCOMES = frozenset({*(outcome.name.lower() for outcome in Outcome), *_SENTENCE
 """Every way in which a run of a batch can end."""
 
 
-def broken(table: Any) -> list[str]:
+def broken(table: Table) -> list[str]:
     """Ids of the runs in a batch's table that crashed or whose worker died."""
-    pairs = zip(table["run_id"].to_pylist(), table["outcome"].to_pylist(), strict=True)
-    return [run_id for run_id, outcome in pairs if outcome in BROKEN]
+    pairs = zip(table["run_id"], table["outcome"], strict=True)
+    return [str(run_id) for run_id, outcome in pairs if outcome in BROKEN]

@@ -5,9 +5,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-import pyarrow as pa
 
 from surgsim.compare.aggregates import iqm_interval, mean_rank, ranks, scores
+from surgsim.compare.columns import Table
 from surgsim.compare.failures import counted_outcomes
 from surgsim.compare.intervals import Interval
 from surgsim.compare.observations import COMPLETED, Observations, metric_named
@@ -53,7 +53,7 @@ class LeaderboardRow:
         return ", ".join(filter(None, (counted_outcomes(self.failures), undone))) or "none"
 
 
-def leaderboard(table: pa.Table | Observations, metric: str, *, places: bool = True) -> list[LeaderboardRow]:
+def leaderboard(table: Table | Observations, metric: str, *, places: bool = True) -> list[LeaderboardRow]:
     """Rows for `metric`, the best place first, then the best mean rank.
 
     Args:

@@ -5,9 +5,9 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-import pyarrow as pa
 from numpy.typing import NDArray
 
+from surgsim.compare.columns import Table
 from surgsim.errors import Outcome, SurgsimError, unknown_name
 from surgsim.metrics.catalog import METRICS
 from surgsim.metrics.metric import Metric
@@ -46,7 +46,7 @@ class Observations:
     smallest: Mapping[str, float] = field(default_factory=dict)
 
     @staticmethod
-    def of(table: pa.Table, smallest: Mapping[str, float] | None = None) -> "Observations":
+    def of(table: Table, smallest: Mapping[str, float] | None = None) -> "Observations":
         """Observations of a batch's table.
 
         Args:
@@ -60,11 +60,11 @@ class Observations:
             texts = {
                 name: _texts(table, name) for name in ("scenario", "controller", "parameters", "outcome")
             }
-            seed = np.array(table.column("seed").to_pylist(), dtype=np.int64)
+            seed = np.array(table["seed"], dtype=np.int64)
             metrics = {name: _numbers(table, name) for name in METRICS}
             success = _numbers(table, "success")
-            exceeded = [text or "" for text in table.column("exceeded").to_pylist()]
-        except (KeyError, TypeError, ValueError, pa.ArrowException) as error:
+            exceeded = [text or "" for text in table["exceeded"]]
+        except (KeyError, TypeError, ValueError) as error:
             raise SurgsimError(f"not a table of batch results: {error}") from error
         return Observations(
             **texts,
@@ -145,13 +145,13 @@ def metric_named(name: str) -> Metric:
     return METRICS[name]
 
 
-def _texts(table: pa.Table, name: str) -> Texts:
-    values = table.column(name).to_pylist()
+def _texts(table: Table, name: str) -> Texts:
+    values = table[name]
     if not all(isinstance(value, str) for value in values):
         raise ValueError(f"column '{name}' holds something other than text")
     return np.array(values, dtype=object)
 
 
-def _numbers(table: pa.Table, name: str) -> Array:
-    values = table.column(name).cast(pa.float64()).to_numpy()
+def _numbers(table: Table, name: str) -> Array:
+    values = np.array(table[name], dtype=np.float64)  # None becomes NaN
     return np.where(np.isfinite(values), values, np.nan)

@@ -17,6 +17,7 @@ from typing import Any
 from surgsim.compare.job import CRASHED, WORKER_DIED, Job, attempt
 from surgsim.compare.workers import Done, record_failure, stopped
 from surgsim.errors import SurgsimError
+from surgsim.packages import require
 from surgsim.recording.files import write_file
 from surgsim.runs.folder import whole_folder
 
@@ -31,10 +32,9 @@ def ray_runner(address: str | None) -> Any:
         SurgsimError: If ray is not installed, or the cluster cannot be reached.
     """
     os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
-    try:
-        import ray
-    except ImportError as error:
-        raise SurgsimError("--engine ray needs ray: install surgsim[ray]") from error
+    require("--engine ray needs", "ray")
+    import ray
+
     ours = not ray.is_initialized()
     try:
         if ours:

@@ -2,28 +2,26 @@
 
 import hashlib
 import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import pyarrow as pa
-import pyarrow.csv
-import pyarrow.parquet
-
+from surgsim.compare.columns import Kind, Schema, Table, csv_text, read_csv
 from surgsim.compare.job import OUTCOMES
-from surgsim.compare.unfinished import unfinished
+from surgsim.compare.unfinished import CSV, SEAL, unfinished
 from surgsim.errors import SurgsimError, unknown_name
 from surgsim.metrics.catalog import METRICS, of_one_arm
 from surgsim.metrics.timing import TIMING_METRICS
+from surgsim.packages import installed
 from surgsim.recording.files import replacing, write_file
 from surgsim.recording.sealed import read_sealed
 from surgsim.runs.folder import SCHEMA_VERSION
 from surgsim.scenario.wording import one_line
 
 TEXT_COLUMNS = ("run_id", "suite", "scenario", "controller")
-PARQUET, CSV = "runs.parquet", "runs.csv"
-_SEAL = b"surgsim.sha256"
+PARQUET = "runs.parquet"
+"""A copy of the table for other programs; it is not read."""
 MACHINE_COLUMNS = (*sorted(TIMING_METRICS), "wall_time_s")
 """Columns that measure the machine: they differ between two equal batches."""
 
@@ -45,18 +43,23 @@ class Row:
     folder: str
 
 
-def schema() -> pa.Schema:
-    """Columns and types of the table."""
-    fields = [pa.field(name, pa.string()) for name in TEXT_COLUMNS]
-    fields += [pa.field("seed", pa.int64()), pa.field("parameters", pa.string())]
-    fields += [pa.field("outcome", pa.string()), pa.field("outcome_t_s", pa.float64())]
-    fields += [pa.field("outcome_detail", pa.string())]
-    fields += [pa.field("success", pa.bool_()), pa.field("success_reason", pa.string())]
-    fields += [pa.field("exceeded", pa.string())]
-    fields += [pa.field(name, pa.float64()) for name in METRICS]
-    fields += [pa.field("wall_time_s", pa.float64())]
-    texts = ("scenario_sha256", "surgsim_version", "code_sha256", "commit", "machine", "folder", "recording")
-    return pa.schema(fields + [pa.field(name, pa.string()) for name in texts])
+def schema() -> Schema:
+    """Columns of the table, and what each holds."""
+    after = ("scenario_sha256", "surgsim_version", "code_sha256", "commit", "machine", "folder", "recording")
+    return {
+        **dict.fromkeys(TEXT_COLUMNS, Kind.TEXT),
+        "seed": Kind.INTEGER,
+        "parameters": Kind.TEXT,
+        "outcome": Kind.TEXT,
+        "outcome_t_s": Kind.NUMBER,
+        "outcome_detail": Kind.TEXT,
+        "success": Kind.TRUTH,
+        "success_reason": Kind.TEXT,
+        "exceeded": Kind.TEXT,
+        **dict.fromkeys(METRICS, Kind.NUMBER),
+        "wall_time_s": Kind.NUMBER,
+        **dict.fromkeys(after, Kind.TEXT),
+    }
 
 
 def read_rows(root: Path, row: Row) -> list[dict[str, Any]]:
@@ -116,79 +119,110 @@ def _of_arm(
     }
 
 
-def write_table(root: Path, rows: Sequence[Row]) -> pa.Table:
-    """Read every run's folder below `root` and write `runs.parquet` and `runs.csv` beside them.
+def write_table(root: Path, rows: Sequence[Row]) -> Table:
+    """Read every run's folder below `root` and write `runs.csv` beside them, and `runs.parquet` with pyarrow.
 
     Raises:
         SurgsimError: If a run is missing or damaged, or the disk refuses.
     """
-    parts = [_part(root, row) for row in rows]
-    table = pa.Table.from_batches(parts, schema=schema())
-    # The Parquet file is last: with it the batch is finished. Two shards may end at the same time.
-    _write(root / CSV, table, pa.csv.write_csv)
-    _write(root / PARQUET, sealed_table(table), pa.parquet.write_table)
+    table = Table.of_rows([line for row in rows for line in _lines(root, row)], schema())
+    keep_table(root, table)
     return table
 
 
-def _write(path: Path, table: pa.Table, write: Callable[[pa.Table, Any], None]) -> None:
-    content = pa.BufferOutputStream()
-    write(table, content)
+def keep_table(root: Path, table: Table) -> None:
+    """Write a batch's table, the checksum last: with it the batch is finished.
+
+    Raises:
+        SurgsimError: If the disk refuses.
+    """
+    content = csv_text(table).encode()
+    copy = _parquet(table)
+    seal = _seal(content)
+    if _held(root / SEAL) != seal:  # never a whole checksum beside another table, whenever this ends
+        _remove(root / SEAL)
+    _write(root / CSV, content)
+    if copy is None:
+        _remove(root / PARQUET)
+    else:
+        _write(root / PARQUET, copy)
+    _write(root / SEAL, seal)
+
+
+def _write(path: Path, content: bytes) -> None:
     with replacing(path) as draft:
-        write_file(draft, content.getvalue().to_pybytes())
+        write_file(draft, content)
 
 
-def read_table(root: Path) -> pa.Table:
-    """The table of a results folder; null in metrics that there were not yet when the batch was run.
+def _remove(path: Path) -> None:
+    try:
+        path.unlink(missing_ok=True)
+    except OSError as error:
+        raise SurgsimError(f"{path}: cannot be removed: {error.strerror or error}") from error
+
+
+def _parquet(table: Table) -> bytes | None:
+    """The table for programs that read Parquet; None without pyarrow."""
+    if not installed("pyarrow"):
+        return None
+    import pyarrow as pa
+    import pyarrow.parquet
+
+    content = pa.BufferOutputStream()
+    pa.parquet.write_table(table.to_arrow(schema()), content)
+    return bytes(content.getvalue().to_pybytes())
+
+
+def _seal(content: bytes) -> bytes:
+    """What `sha256sum runs.csv` prints."""
+    return f"{hashlib.sha256(content).hexdigest()}  {CSV}\n".encode()
+
+
+def _held(path: Path) -> bytes | None:
+    """The content of a file; None if there is none, or it cannot be read."""
+    try:
+        return path.read_bytes() if path.is_file() else None
+    except OSError:
+        return None
+
+
+def read_table(root: Path) -> Table:
+    """The table of a results folder; None in metrics that there were not yet when the batch was run.
 
     Raises:
         SurgsimError: If there is none, the batch is not finished, or the table is not one of surgsim's.
     """
-    path = root / PARQUET
+    path = root / CSV
     if told := unfinished(root):
         raise SurgsimError(f"{root}: {told}")
-    if not path.is_file():
-        raise SurgsimError(f"{root} holds no {PARQUET}: it is no folder of batch results")
+    for name in (CSV, SEAL):
+        if not (root / name).is_file():
+            raise SurgsimError(f"{root} holds no {name}: it is no folder of batch results")
     try:
-        table = pa.parquet.read_table(path, partitioning=None, page_checksum_verification=True)
-        table.validate(full=True)
-    except (OSError, ValueError, pa.ArrowException) as error:
-        reason = next(iter(str(error).splitlines()), "it cannot be read")
-        raise SurgsimError(f"{path} is damaged: {one_line(reason, 200)}") from error
-    later = [name for name in METRICS if name not in table.column_names]
-    missing = [name for name in schema().names if name not in (*table.column_names, *later)]
+        content = path.read_bytes()
+        if _seal(content) != (root / SEAL).read_bytes():
+            raise SurgsimError(f"{path} is damaged: it does not hold what `surgsim compare` wrote")
+        table = read_csv(content.decode(), schema())
+    except (OSError, ValueError) as error:
+        raise SurgsimError(f"{path} is damaged: {one_line(str(error), 200)}") from error
+    missing = [name for name in schema() if name not in table.columns and name not in METRICS]
     if missing:
         raise SurgsimError(f"{path} has no column '{missing[0]}': it is not a table of this version")
-    for field in schema():
-        if field.name in later:
-            continue
-        if (found := table.schema.field(field.name).type) != field.type:
-            raise SurgsimError(f"{path}: column '{field.name}' holds {found}, not {field.type}")
-    if table.num_rows == 0:
+    if len(table) == 0:
         raise SurgsimError(f"{path} has no rows")
-    if (table.schema.metadata or {}).get(_SEAL) != _digest(table):
-        raise SurgsimError(f"{path} is damaged: it does not hold what `surgsim compare` wrote")
-    for name in later:
-        table = table.append_column(pa.field(name, pa.float64()), pa.nulls(table.num_rows, pa.float64()))
-    return table.replace_schema_metadata(None)
+    nothing = (None,) * len(table)
+    return Table({name: table.columns.get(name, nothing) for name in schema()})
 
 
-def sealed_table(table: pa.Table) -> pa.Table:
-    """`table` with the SHA-256 of its content in the meta data of its schema."""
-    return table.replace_schema_metadata({_SEAL: _digest(table)})
-
-
-def _digest(table: pa.Table) -> bytes:
-    content = [table.schema.remove_metadata().to_string(), table.to_pylist()]
-    return hashlib.sha256(json.dumps(content, default=str).encode()).hexdigest().encode()
-
-
-def _part(root: Path, row: Row) -> pa.RecordBatch:
-    """A run's rows as a table."""
+def _lines(root: Path, row: Row) -> list[dict[str, Any]]:
+    """A run's rows, each value of its column's kind."""
+    lines = read_rows(root, row)
     try:
-        return pa.RecordBatch.from_pylist(read_rows(root, row), schema=schema())
-    except (pa.ArrowException, OverflowError) as error:
+        Table.of_rows(lines, schema())
+    except ValueError as error:
         path = root / row.folder / "metrics.json"
         raise SurgsimError(f"{path} holds a value of another type: {error}") from error
+    return lines
 
 
 def _check_summary(summary: Mapping[str, Any]) -> None:

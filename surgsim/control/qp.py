@@ -9,6 +9,7 @@ import daqp
 import numpy as np
 from numpy.typing import NDArray
 
+from surgsim.packages import require
 from surgsim.tick.quadratic_program import SOLVED, solve, workspace
 
 Array = NDArray[np.float64]
@@ -43,12 +44,23 @@ class DenseQp:
         return self._solve(H, f, lower, upper, G, G_lower, G_upper)
 
 
+def check_package(name: str) -> None:
+    """Refuse a shipped back end whose package is not installed.
+
+    Raises:
+        MissingPackageError: Then.
+    """
+    if name == "osqp":
+        require("the QP solver 'osqp' needs", "osqp")
+
+
 def _backend(name: str) -> Solve:
     if name == "active_set":
         return _ActiveSet().solve
     if name == "daqp":
         return _Daqp().solve
     if name == "osqp":
+        check_package(name)
         from surgsim.control.qp_osqp import Osqp  # a third of a second, and only this back end needs it
 
         return Osqp().solve

@@ -3,6 +3,7 @@
 from typing import TYPE_CHECKING, Any
 
 from surgsim.control.policies.registry import policy_names, register_policy
+from surgsim.packages import ENVIRONMENT, require
 
 if TYPE_CHECKING:
     from surgsim.env.environment import load
@@ -12,6 +13,7 @@ __all__ = ["load", "policy_names", "register_policy"]
 
 def __getattr__(name: str) -> Any:
     if name == "load":  # dm_control is imported once an environment is wanted
+        require("learning environments need", *ENVIRONMENT)
         from surgsim.env.environment import load
 
         return load

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import pyarrow as pa
-import pyarrow.parquet as pq
 from numpy.typing import NDArray
 from scipy.io import savemat
+
+from surgsim.packages import require
 
 UNITS, ABOUT = "surgsim_units", "surgsim_about"
 """Names beside the columns: the unit of each, and where all of it comes from, as JSON."""
@@ -84,6 +84,10 @@ def npz(columns: Sequence[Column], about: str) -> bytes:
 
 def parquet(columns: Sequence[Column], about: str) -> bytes:
     """Parquet: unit and meaning in each field's metadata, `about` in the schema's."""
+    require("Parquet needs", "pyarrow")
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
     fields, arrays = [], []
     for column in columns:
         kind = pa.string() if column.is_text else pa.from_numpy_dtype(column.values.dtype)

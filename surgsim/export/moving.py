@@ -9,11 +9,10 @@ from typing import Protocol
 import numpy as np
 from PIL import Image
 
-from surgsim.errors import SurgsimError
 from surgsim.models.drawing import Picture
+from surgsim.packages import require
 
 SUFFIXES = (".gif", ".mp4")
-NO_PYAV = "needs PyAV: pip install 'surgsim[video]'"
 _GIF_UNIT_S = Fraction(1, 100)
 _GIF_COLOURS = 256
 _CLOCK_HZ = 90_000
@@ -38,12 +37,9 @@ def check_encoder(option: str) -> None:
     """Refuse to write MP4 where PyAV is not installed.
 
     Raises:
-        SurgsimError: Then, with the command that installs it.
+        MissingPackageError: Then, with the command that installs it.
     """
-    try:
-        import av  # noqa: F401
-    except ModuleNotFoundError as error:
-        raise SurgsimError(f"{option} {NO_PYAV}") from error
+    require(f"{option} needs", "av")
 
 
 @contextmanager

@@ -7,6 +7,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+from surgsim.compare.unfinished import has_table
 from surgsim.errors import RecordingError, SurgsimError, unknown_name
 from surgsim.metrics.catalog import of_one_arm
 from surgsim.recording.contents import check_contents
@@ -169,7 +170,7 @@ def find(name: str) -> Subject:
         SurgsimError: If it is nothing that can be exported, or it is damaged.
     """
     path = _located(name)
-    if (path / "runs.parquet").is_file() or (path / "suite.json").is_file():
+    if has_table(path) or (path / "suite.json").is_file():
         return BatchSubject(path=path, results=read_results(path))
     if (path / "metrics.json").is_file() or path.suffix == ".rrd" or (path / FILE_NAME).is_file():
         return _run(path)

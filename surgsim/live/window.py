@@ -14,6 +14,7 @@ from surgsim.errors import SurgsimError
 from surgsim.live.keyboard import Keyboard
 from surgsim.live.picture import Picture, screen_axes
 from surgsim.live.status import Status
+from surgsim.packages import require
 from surgsim.plant.truth import Truth
 from surgsim.recording.view import display
 from surgsim.simulate.setup import Setup
@@ -35,6 +36,7 @@ def check_display() -> None:
         raise SurgsimError(
             "operating needs MuJoCo's passive viewer, which a plain Python on macOS cannot open"
         )
+    require("operating needs", "glfw", "OpenGL")
     import glfw
 
     with warnings.catch_warnings():

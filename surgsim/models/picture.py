@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from surgsim.errors import SurgsimError, unknown_name
 from surgsim.models.build import Scene
+from surgsim.packages import require
 
 
 def render(
@@ -53,6 +54,7 @@ def renderer(model: mujoco.MjModel, width: int, height: int, most_geoms: int = 1
     Raises:
         SurgsimError: If the picture is too large, or this machine cannot draw.
     """
+    require("pictures need", "OpenGL")
     try:
         return mujoco.Renderer(model, height=height, width=width, max_geom=most_geoms)
     except ValueError as error:

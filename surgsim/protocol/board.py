@@ -85,13 +85,20 @@ def make_board(
                 tell(f"{number} of {len(wishes)}: {folder}")
     if missing:
         return None
-    _write_passports(board, found)
+    if left_out := _write_passports(board, found):
+        tell(left_out)
     write_board(board.out, board.protocol, found)
     return list(found.values())
 
 
-def _write_passports(board: Board, found: dict[Path, Score]) -> None:
-    """Each passport beside the baselines of its track; no picture, which is half a megabyte each."""
+def _write_passports(board: Board, found: dict[Path, Score]) -> str:
+    """Each passport beside the baselines of its track; no picture, which is half a megabyte each.
+
+    Returns:
+        Why they have no chart, in a line; empty if they have.
+    """
+    left_out = ""
     for folder, made in found.items():
         beside = baselines_of(made, found.values(), board.protocol)
-        write_passport(folder, made, beside, board.protocol.config, drawn=(".pdf",))
+        left_out = write_passport(folder, made, beside, board.protocol.config, drawn=(".pdf",))
+    return left_out

@@ -24,7 +24,7 @@ from surgsim.protocol.scorecard import scorecard
 from surgsim.protocol.seeds import Seeds
 from surgsim.recording.files import replacing, write_file
 from surgsim.recording.folders import make_folder
-from surgsim.runs.parts import check_externals
+from surgsim.runs.parts import check_parts
 from surgsim.runs.provenance import provenance
 
 SCHEMA_VERSION = 1
@@ -114,7 +114,7 @@ def score(wish: Wish, means: Means, report: Report | None = None) -> Score | Non
     check_entry(wish.track, wish.protocol.track(wish.track), wish.entrant.config)
     frozen = check_frozen(wish.protocol, wish.track, wish.arms)
     asked = cells(wish.protocol, wish.track, wish.arms, wish.seeds, wish.entrant.config, wish.entrant.scheme)
-    check_externals([cell.scenario for cell in asked if cell.scenario is not None])
+    check_parts([cell.scenario for cell in asked if cell.scenario is not None])
     found = run_cells(asked, means.store, means.runner, means.jobs, report, means.shard)
     return None if found is None else score_of(wish, found, frozen, means.command)
 

@@ -4,9 +4,6 @@ import os
 from collections.abc import Callable
 from pathlib import Path
 
-import pyarrow as pa
-import pyarrow.parquet as pq
-
 from surgsim.errors import SurgsimError
 from surgsim.recording.files import replacing, write_file
 from surgsim.trace.trace import Trace
@@ -45,6 +42,9 @@ def check_export(path: Path) -> None:
 
 
 def _parquet(trace: Trace) -> bytes:
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
     units = [block.unit for block in trace.blocks for _ in block.columns]
     fields = [
         pa.field(name, pa.float64(), metadata={"unit": unit or "1"})

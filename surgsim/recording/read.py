@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from surgsim.errors import RecordingError
+from surgsim.packages import RECORDING, require
 from surgsim.recording.framing import check_framing, recording_file
 from surgsim.recording.layout import Header
 from surgsim.resources import run_module
@@ -36,9 +37,11 @@ def read_recording(path: str | os.PathLike[str]) -> Recorded:
 
     Raises:
         RecordingError: If there is none, it is damaged or cut short, or surgsim did not write it.
+        MissingPackageError: If rerun or pyarrow is not installed.
     """
     file = recording_file(Path(path))
     check_framing(file)
+    require("recordings need", *RECORDING)
     texts, data = _parse(file, _extract(file))
     header = Header.from_texts(texts)
     if reason := _fault(header):

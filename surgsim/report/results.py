@@ -9,8 +9,10 @@ from typing import Any
 
 import numpy as np
 
+from surgsim.compare.columns import Table
 from surgsim.compare.observations import Observations
 from surgsim.compare.table import read_table
+from surgsim.compare.unfinished import CSV
 from surgsim.errors import SurgsimError
 from surgsim.metrics.catalog import METRICS
 from surgsim.recording.sealed import read_sealed
@@ -87,7 +89,7 @@ def read_results(folder: Path, matters: Mapping[str, float] | None = None) -> Re
     return results_of(folder, read_table(folder), matters)
 
 
-def results_of(folder: Path, table: Any, matters: Mapping[str, float] | None = None) -> Results:
+def results_of(folder: Path, table: Table, matters: Mapping[str, float] | None = None) -> Results:
     """As `read_results`, where the folder's `table` is at hand, as `read_table` gives it.
 
     Raises:
@@ -99,8 +101,8 @@ def results_of(folder: Path, table: Any, matters: Mapping[str, float] | None = N
     try:
         runs = Observations.of(table, smallest)
     except SurgsimError as error:
-        raise SurgsimError(f"{folder / 'runs.parquet'}: {error}") from error
-    return Results(folder=folder, rows=table.to_pylist(), runs=runs, suite=suite)
+        raise SurgsimError(f"{folder / CSV}: {error}") from error
+    return Results(folder=folder, rows=table.rows(), runs=runs, suite=suite)
 
 
 def _suite(path: Path) -> Mapping[str, Any]:

@@ -16,6 +16,7 @@ import numpy as np
 from surgsim.errors import SurgsimError
 from surgsim.models.arm import ArmModel
 from surgsim.models.picture import render
+from surgsim.packages import require
 from surgsim.scenario.arms import Experiment, drawn_scenes, each_arm
 from surgsim.scenario.load import load_experiment
 from surgsim.simulate.setup import beginning
@@ -66,12 +67,13 @@ def _points(points: Sequence[Any] | np.ndarray) -> list[list[float]]:
 
 def _picture(scenario: Experiment, starts: Sequence[np.ndarray]) -> str | None:
     """The scene as camera `overview` sees it; None where this machine cannot draw."""
-    from PIL import Image
-
     try:
+        require("pictures need", "PIL")
         pixels = render(drawn_scenes(scenario), starts, "overview", WIDTH, HEIGHT)
     except SurgsimError:
         return None
+    from PIL import Image
+
     written = io.BytesIO()
     Image.fromarray(pixels).save(written, "JPEG", quality=_QUALITY, optimize=True)
     return base64.b64encode(written.getvalue()).decode()

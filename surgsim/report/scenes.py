@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 
+from surgsim.packages import lacking
 from surgsim.report.results import Results
 from surgsim.resources import run_module
 
@@ -56,7 +57,8 @@ def _source(results: Results, name: str) -> str:
 def look(scenarios: tuple[str, ...]) -> tuple[SceneView, ...]:
     """Scenes of scenarios, given by name or path."""
     undrawn = None
-    for environment in _environments():
+    drawn = not lacking("", "OpenGL", "PIL")
+    for environment in _environments() if drawn else ():
         found = _ask({"scenarios": scenarios, "draw": True}, environment)
         if found is not None and all(scene["picture"] for scene in found):
             return tuple(map(_view, found))

@@ -13,6 +13,7 @@ from typing import Any
 from surgsim.compiled.watch import working_time
 from surgsim.errors import SurgsimError
 from surgsim.metrics.catalog import evaluate
+from surgsim.packages import RECORDING, require
 from surgsim.recording.contents import SUMMARY, contents_of
 from surgsim.recording.files import write_file
 from surgsim.recording.folders import make_folder, sync_tree
@@ -68,10 +69,21 @@ def run_to_folder(
         SurgsimError: If the scenario cannot be started, or the folder cannot be written.
     """
     check_target(folder)
+    check_recordable(record)
     result = execute(scenario, progress)
     check_target(folder)  # it may have been filled meanwhile
     write_run(scenario, result, folder, record=record)
     return result
+
+
+def check_recordable(record: bool) -> None:
+    """Refuse to record where recordings cannot be written.
+
+    Raises:
+        MissingPackageError: With the package that is missing.
+    """
+    if record:
+        require("recordings need", *RECORDING, otherwise="--no-record")
 
 
 def execute(scenario: Experiment, progress: Progress | None = None) -> RunResult:

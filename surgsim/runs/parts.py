@@ -91,13 +91,18 @@ def _declared(part: ExternalConfig | ExternalLawConfig, scenario: Scenario) -> d
     return {"name": told.name, "version": told.release}
 
 
-def check_externals(scenarios: Iterable[Experiment]) -> None:
-    """Refuse scenarios with an external controller that has no command, or without one that was asked for.
+def check_parts(scenarios: Iterable[Experiment]) -> None:
+    """Refuse scenarios with a part that cannot be had here.
+
+    That is one whose package is not installed, or an external controller that has no command; without an
+    external controller that was asked for they are refused too.
 
     Raises:
         SurgsimError: For the first.
     """
-    parts = (part for s in scenarios for one in each_arm(s) for part in _parts(one.controller))
+    parts = [part for s in scenarios for one in each_arm(s) for part in _parts(one.controller)]
+    for part in parts:
+        part.check_installed()
     check_named(part.name for part in parts if isinstance(part, ExternalConfig | ExternalLawConfig))
 
 

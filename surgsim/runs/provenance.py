@@ -17,6 +17,9 @@ from surgsim.runs.sources import LATER_ROOMS, ROOT, sources_sha256
 from surgsim.scenario.arms import Experiment
 
 _PACKAGES = ("mujoco", "numpy", "scipy", "mink", "daqp", "qpsolvers", "osqp", "rerun-sdk")
+"""Those that are installed are told."""
+_HELD_BY = {"mujoco": "mujoco-core"}
+"""The distribution that has the modules, where it is another one: the small installation has it alone."""
 _OF_NO_CONSEQUENCE = frozenset({"rerun-sdk"})
 _THAT_COUNT = ("surgsim/*.py", "assets", *(f":(exclude)surgsim/{room}" for room in LATER_ROOMS))
 
@@ -74,7 +77,7 @@ def code_difference(old: Mapping[str, Any], new: Mapping[str, Any]) -> str:
 
 def _version(name: str) -> str | None:
     try:
-        return version(name)
+        return version(_HELD_BY.get(name, name))
     except PackageNotFoundError:
         return None
 

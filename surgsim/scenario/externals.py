@@ -18,7 +18,7 @@ from surgsim.scenario.yaml_text import read_yaml
 def externals_given(commands: Mapping[str, str]) -> Iterator[None]:
     """Within the block, external controllers have these commands, and others those of the user's own file.
 
-    Runs that name none of these are refused by `surgsim.runs.parts.check_externals`.
+    Runs that name none of these are refused by `surgsim.runs.parts.check_parts`.
 
     Raises:
         SurgsimError: If a name is none, or that file is not right.

@@ -7,6 +7,7 @@ from functools import partial
 from itertools import chain
 from pathlib import Path
 
+from surgsim.packages import require
 from surgsim.studies.figure import figure
 from surgsim.studies.kept import read_measured, write_measured
 from surgsim.studies.page import write_page
@@ -45,6 +46,8 @@ def run_study(
         progress: Told of what is done.
         kept: Folder for measured cases: those that it has are not run again. None keeps nothing.
     """
+    if not quick:
+        require("figures need", "matplotlib", otherwise="--quick")
     groups = study.cases(quick)
     cases = dict.fromkeys(case for group in groups.values() for case in group)
     results = Results(groups, measure_cases(cases, progress, kept=kept))

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from surgsim.columns import Block, joints, scalar, vector
 from surgsim.display import joined_names
-from surgsim.errors import Outcome, SurgsimError, UnknownNameError, not_held
+from surgsim.errors import Outcome, UnknownNameError, not_held
+from surgsim.packages import require
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -303,10 +304,9 @@ class Trace:
         Raises:
             SurgsimError: If pandas is not installed.
         """
-        try:
-            import pandas as pd
-        except ModuleNotFoundError as error:
-            raise SurgsimError("to_pandas needs pandas: pip install 'surgsim[pandas]'") from error
+        require("to_pandas needs", "pandas")
+        import pandas as pd
+
         return pd.DataFrame(self.to_numpy(), columns=list(self.columns))
 
     def __repr__(self) -> str:

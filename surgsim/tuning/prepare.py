@@ -4,7 +4,7 @@ from surgsim.catalog import check_name
 from surgsim.compare.suite import parse_seeds
 from surgsim.errors import ScenarioError, SurgsimError
 from surgsim.models.robot import robot_joints
-from surgsim.runs.parts import check_externals
+from surgsim.runs.parts import check_parts
 from surgsim.scenario.load import load_controller, load_scenario
 from surgsim.scenario.schema import Scenario
 from surgsim.tuning.gains import gains_of
@@ -25,7 +25,7 @@ def prepare(wish: Wish) -> Tuning:
     if not 0 <= wish.seed <= MOST_SEED:
         raise SurgsimError(f"--seed: {wish.seed} is not allowed: must be 0 to {MOST_SEED}")
     scenarios = _scenarios(wish)
-    check_externals(scenarios)
+    check_parts(scenarios)
     controller = scenarios[0].controller
     joints = sorted({robot_joints(scenario.robot) for scenario in scenarios})
     if len(joints) > 1:

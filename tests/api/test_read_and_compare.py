@@ -43,7 +43,7 @@ def test_its_table_and_its_leaderboard(batch):
     found = surgsim.read(batch)
     frame = found.to_pandas()
     assert isinstance(frame, pd.DataFrame)
-    assert frame["outcome"].tolist() == found.table.column("outcome").to_pylist() == ["completed"] * 4
+    assert frame["outcome"].tolist() == list(found.table["outcome"]) == ["completed"] * 4
     board = found.leaderboard("tip_error_rms_mm")
     assert repr(board).startswith("Nobody wins by tip error")
     means = frame.groupby("controller")["tip_error_rms_mm"].mean()
@@ -135,7 +135,7 @@ def test_scenarios_and_controllers_are_taken_as_content_too(quick, tmp_path):
     assert (found.scenarios, found.controllers) == (["small", "smaller"], ["pinv", "stiff"])
     assert found["smaller/stiff/base-seed0"].scenario.task.radius_m == 0.001
     again = surgsim.compare([small, tree], resume=True, **options)
-    assert again.table.equals(found.table)
+    assert again.table == found.table
     tree["task"]["radius_m"] = 0.0015
     with pytest.raises(
         surgsim.SurgsimError, match="holds the results of another suite, or of other settings"
@@ -191,7 +191,7 @@ def test_what_is_neither_run_nor_batch_says_what_is_missing(tmp_path, batch, fol
         surgsim.read(tmp_path / "nothing.rrd")
     unfinished = tmp_path / "unfinished"
     shutil.copytree(batch, unfinished)
-    (unfinished / "runs.parquet").unlink()
+    (unfinished / "runs.csv.sha256").unlink()
     shutil.copytree(unfinished / "runs" / RUN, (unfinished / "runs" / RUN).with_name(".base-seed9.x.part"))
     with pytest.raises(surgsim.SurgsimError, match=r"the batch is not finished: 4 runs there, no table yet"):
         surgsim.read(unfinished)

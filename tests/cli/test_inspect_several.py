@@ -5,16 +5,16 @@ import math
 import shutil
 from pathlib import Path
 
-import pyarrow as pa
 import pytest
 from batches import Here, short_run
 from rerun.chunk import RrdReader
 
 from surgsim.cli.inspect_pair import _shown, differing, largest_gap_mm
 from surgsim.cli.main import main
+from surgsim.compare.columns import Table
 from surgsim.compare.engine import Batch, compare
 from surgsim.compare.suite import SuiteConfig
-from surgsim.compare.table import read_table
+from surgsim.compare.table import read_table, schema
 from surgsim.display import number
 from surgsim.metrics.catalog import METRICS
 from surgsim.metrics.timing import TIMING_METRICS
@@ -154,7 +154,7 @@ def test_what_is_wrong_is_one_line(batch, runs, capsys, tmp_path):
         f"'nothing' is not a run of {batch}. Known: {B}, {A}.": [str(batch), "--run", "nothing"],
         "inspect takes one recording, two, or a batch's folder": [*runs, runs[0]],
         "--export takes one recording": [*runs, "--export", str(tmp_path / "x.parquet")],
-        f"{runs[0]} holds no runs.parquet: it is no folder of batch results": [
+        f"{runs[0]} holds no runs.csv: it is no folder of batch results": [
             runs[0],
             "--run",
             A,
@@ -201,7 +201,7 @@ def test_a_run_without_recording_says_how_to_record_it(copy, capsys):
 
 @pytest.mark.parametrize("more", [[], ["--run", A], ["--json"]])
 def test_a_batch_that_is_not_finished_says_how_to_go_on(copy, capsys, more):
-    (copy / "runs.parquet").unlink()
+    (copy / "runs.csv.sha256").unlink()
     (copy / "runs" / B / "metrics.json").unlink()
     assert said(["inspect", str(copy), *more], capsys) == (
         f"surgsim: {copy}: the batch is not finished: 1 run there, no table yet. "
@@ -215,8 +215,8 @@ def listed(copy, monkeypatch):
 
     def change(changes):
         table = read_table(copy)
-        rows = [{**row, **changes(row)} for row in table.to_pylist()]
-        changed = pa.Table.from_pylist(rows, schema=table.schema)
+        rows = [{**row, **changes(row)} for row in table.rows()]
+        changed = Table.of_rows(rows, schema())
         monkeypatch.setattr("surgsim.compare.table.read_table", lambda root: changed)
         return rows
 

@@ -160,7 +160,7 @@ def batch(tmp_path_factory):
 
 
 def test_a_batch_has_a_row_for_each_arm_of_a_run(batch, folder):
-    rows = batch.table.to_pylist()
+    rows = batch.table.rows()
     assert [row["scenario"] for row in rows] == [f"{NAME}.left", f"{NAME}.right"]
     assert rows[0]["run_id"] == f"{NAME}/rcm_inverse_dynamics/base-seed0.left"
     assert [row["success"] for row in rows] == [True, True]
@@ -171,7 +171,7 @@ def test_a_batch_has_a_row_for_each_arm_of_a_run(batch, folder):
 
 
 def test_the_report_follows_each_arm_over_time_and_has_the_scene_of_both(batch):
-    rows, said = batch.table.to_pylist(), []
+    rows, said = batch.table.rows(), []
     series = read_series(batch.folder, rows, [row["scenario"] for row in rows], said.append)
     for row in rows:
         errors = series[row["scenario"]].completed[row["controller"]]["tip_error_m"]

@@ -7,12 +7,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pyarrow as pa
-import pyarrow.parquet
 import pytest
 
+from surgsim.compare.columns import Table
 from surgsim.compare.observations import Observations
-from surgsim.compare.table import schema, sealed_table
+from surgsim.compare.table import keep_table, schema
 from surgsim.metrics.catalog import METRICS
 from surgsim.recording.sealed import sealed
 
@@ -39,7 +38,7 @@ VERSIONS = {
 
 def row_of(**given: Any) -> dict[str, Any]:
     """A row of the table, completed, with `given` values and no other metric."""
-    row: dict[str, Any] = dict.fromkeys(schema().names)
+    row: dict[str, Any] = dict.fromkeys(schema())
     row.update(suite="made", scenario="s", controller="a", seed=0, parameters="{}", outcome="completed")
     row.update(outcome_t_s=10.0, outcome_detail="", wall_time_s=1.0, scenario_sha256="0" * 64)
     row.update(surgsim_version="0.1.0", commit=None, machine="Linux x86_64", folder="runs/x", recording=None)
@@ -50,7 +49,7 @@ def row_of(**given: Any) -> dict[str, Any]:
 
 def observations(rows: list[dict[str, Any]]) -> Observations:
     """Observations of `rows`."""
-    return Observations.of(pa.Table.from_pylist(rows, schema=schema()))
+    return Observations.of(Table.of_rows(rows, schema()))
 
 
 def _outcome(controller: int, mass: float, rng: np.random.Generator) -> str:
@@ -79,7 +78,7 @@ def _metrics(
 
 
 def make_results(root: Path, names: dict[str, Any] = PLAIN, seeds: int = 10) -> Path:
-    """Write runs.parquet, suite.json and the folders of the first seed, with files in place of recordings."""
+    """Write the table, suite.json and the folders of the first seed, with files in place of recordings."""
     rng = np.random.default_rng(7)
     rows = []
     for i, scenario in enumerate(names["scenarios"]):
@@ -115,7 +114,7 @@ def make_results(root: Path, names: dict[str, Any] = PLAIN, seeds: int = 10) -> 
 def write_results(root: Path, rows: list[dict[str, Any]], names: dict[str, Any] = PLAIN) -> None:
     """Write the table and `suite.json`."""
     root.mkdir(parents=True, exist_ok=True)
-    pa.parquet.write_table(sealed_table(pa.Table.from_pylist(rows, schema=schema())), root / "runs.parquet")
+    keep_table(root, Table.of_rows(rows, schema()))
     suite = {
         "name": "made",
         "description": "made-up <results> & more",

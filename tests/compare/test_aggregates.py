@@ -1,7 +1,6 @@
 """Scores, interquartile means, profiles and ranks: worked by hand, and against rliable."""
 
 import numpy as np
-import pyarrow as pa
 import pytest
 from scipy.stats import trim_mean
 
@@ -12,9 +11,10 @@ from surgsim.compare.aggregates import (
     ranks,
     scores,
 )
+from surgsim.compare.columns import Table
 from surgsim.compare.intervals import SEEDS_DO_NOT_MATTER
 from surgsim.compare.leaderboard import leaderboard
-from surgsim.compare.table import read_table
+from surgsim.compare.table import read_table, schema
 from surgsim.errors import SurgsimError
 
 TIP = "tip_error_rms_mm"
@@ -119,7 +119,7 @@ def test_a_leaderboard_without_chance_says_so(runs_of):
 
 def test_leaderboard_of_a_table_is_the_same_each_time(made_results):
     table = read_table(made_results())
-    first, again = leaderboard(table, TIP), leaderboard(table.take(list(range(table.num_rows))[::-1]), TIP)
+    first, again = leaderboard(table, TIP), leaderboard(Table.of_rows(table.rows()[::-1], schema()), TIP)
     assert {row.controller: row for row in first} == {row.controller: row for row in again}
     assert sum(row.runs for row in first) == 360
     assert all(row.runs == row.completed + row.failed == 90 for row in first)
@@ -131,9 +131,9 @@ def test_leaderboard_refuses_what_is_no_table_or_metric(made_results):
     with pytest.raises(SurgsimError, match="'speed' is not a metric"):
         leaderboard(read_table(made_results()), "speed")
     with pytest.raises(SurgsimError, match="not a table of batch results"):
-        leaderboard(pa.table({"seed": [1]}), TIP)
+        leaderboard(Table({"seed": (1,)}), TIP)
     table = read_table(made_results())
-    worded = table.set_column(table.schema.get_field_index(TIP), TIP, pa.array(["x"] * table.num_rows))
+    worded = Table({**table.columns, TIP: ("x",) * len(table)})
     with pytest.raises(SurgsimError, match="not a table of batch results"):
         leaderboard(worded, TIP)
 

@@ -42,7 +42,7 @@ def report(done, count, outcome):
         killed.append(done)
 
 table = compare(Batch(suite=suite, folder=Path(), out=out), report, runner)
-print(json.dumps({"rows": table.num_rows, "killed": len(killed), "nodes": len(cluster.list_all_nodes())}))
+print(json.dumps({"rows": len(table), "killed": len(killed), "nodes": len(cluster.list_all_nodes())}))
 cluster.shutdown()
 """
 FAILURES = """
@@ -97,7 +97,7 @@ def run_script(tmp_path):
 
 
 def kept(table):
-    return repr(table.drop_columns(list(MACHINE_COLUMNS)).to_pylist())
+    return repr(table.without(MACHINE_COLUMNS))
 
 
 def test_a_job_is_done_in_a_folder_of_its_node_and_its_files_come_back(scenario, tmp_path):
@@ -133,7 +133,7 @@ def test_without_ray_the_message_says_what_to_install(capsys, monkeypatch, tmp_p
     monkeypatch.chdir(tmp_path)
     monkeypatch.setitem(sys.modules, "ray", None)
     assert main(["compare", "quick", "--engine", "ray"]) == 2
-    assert capsys.readouterr().err == "surgsim: --engine ray needs ray: install surgsim[ray]\n"
+    assert capsys.readouterr().err == "surgsim: --engine ray needs ray: pip install 'surgsim[ray]'\n"
     assert list(tmp_path.iterdir()) == []
 
 

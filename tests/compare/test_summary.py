@@ -106,7 +106,7 @@ def test_where_each_fails(runs_of):
 def test_the_first_sentence_of_the_reference_runs_against_plain_arithmetic(suite):
     """The figures of the sentence, from the rows alone."""
     table = read_table(RESULTS / suite)
-    rows, metric = table.to_pylist(), "rcm_error_rms_mm"
+    rows, metric = table.rows(), "rcm_error_rms_mm"
     assert all(row["outcome"] == "completed" for row in rows)
     scenarios, names = sorted({r["scenario"] for r in rows}), {r["controller"] for r in rows}
     mean = {

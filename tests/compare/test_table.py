@@ -1,17 +1,22 @@
 """The tidy table: its types, its nulls, the same in both files, and what is said of damaged ones."""
 
+import hashlib
 import json
 import math
 import os
 import re
+import sys
 from pathlib import Path
 
 import pyarrow as pa
 import pyarrow.csv
 import pyarrow.parquet
 import pytest
+from hypothesis import example, given
+from hypothesis import strategies as st
 
-from surgsim.compare.table import MACHINE_COLUMNS, Row, read_table, schema, sealed_table, write_table
+from surgsim.compare.columns import Kind, Table, csv_text, read_csv
+from surgsim.compare.table import MACHINE_COLUMNS, Row, keep_table, read_table, schema, write_table
 from surgsim.errors import SurgsimError
 from surgsim.metrics.catalog import METRICS
 from surgsim.recording.sealed import sealed
@@ -20,7 +25,7 @@ TEXT = {"run_id", "suite", "scenario", "controller", "parameters", "outcome", "o
 TEXT |= {"success_reason", "exceeded"}
 TEXT |= {"scenario_sha256", "code_sha256", "surgsim_version", "commit", "machine", "folder", "recording"}
 
-
+FILES = ["runs", "runs.csv", "runs.csv.sha256", "runs.parquet"]
 HELD = {"metric": "rcm_error_max_mm", "value": 9.0, "most": 5.0, "source": "x", "exceeded": True}
 
 
@@ -77,12 +82,12 @@ def table(results, tmp_path):
 
 
 def test_every_column_has_its_type(table):
-    assert table.schema == schema()
-    types = {field.name: field.type for field in table.schema}
-    assert {name for name, kind in types.items() if kind == pa.string()} == TEXT
-    assert types.pop("seed") == pa.int64()
-    assert types.pop("success") == pa.bool_()
-    numbers = {name for name, kind in types.items() if kind == pa.float64()}
+    types = dict(schema())
+    assert list(table.columns) == list(types)
+    assert {name for name, kind in types.items() if kind is Kind.TEXT} == TEXT
+    assert types.pop("seed") is Kind.INTEGER
+    assert types.pop("success") is Kind.TRUTH
+    numbers = {name for name, kind in types.items() if kind is Kind.NUMBER}
     assert numbers == {*METRICS, "outcome_t_s", "wall_time_s"}
     assert set(MACHINE_COLUMNS) == {
         "control_time_p50_us",
@@ -93,20 +98,20 @@ def test_every_column_has_its_type(table):
 
 
 def test_a_failed_run_is_a_row_without_metrics(table):
-    row = table.to_pylist()[1]
+    row = table.rows()[1]
     assert (row["outcome"], row["outcome_detail"]) == ("worker_died", 'exit, "code"\n-9')
     assert [row[name] for name in METRICS] == [None] * len(METRICS)
     assert (row["seed"], row["wall_time_s"]) == (3, 0.5)
 
 
 def test_success_stands_beside_the_outcome(table):
-    row = table.to_pylist()[0]
+    row = table.rows()[0]
     assert (row["outcome"], row["success"], row["success_reason"]) == ("completed", False, "made up")
     assert row["exceeded"] == "rcm_error_max_mm"
 
 
 def test_what_is_not_defined_is_null_and_the_rest_is_exact(table):
-    first, _, last = table.to_pylist()
+    first, _, last = table.rows()
     assert {name: first[name] for name in METRICS} == summary()["metrics"]
     assert last["rcm_error_max_mm"] is None
     assert first["outcome_t_s"] == 0.1 + 0.2
@@ -117,18 +122,71 @@ def test_what_is_not_defined_is_null_and_the_rest_is_exact(table):
 def test_a_recording_is_named_when_it_is_there(results, tmp_path):
     rows = results(summary(), summary())
     (tmp_path / "runs" / "1" / "recording.rrd").write_text("")
-    assert write_table(tmp_path, rows)["recording"].to_pylist() == [None, "runs/1/recording.rrd"]
+    assert write_table(tmp_path, rows)["recording"] == (None, "runs/1/recording.rrd")
 
 
 def test_both_files_hold_the_same_table(table, tmp_path):
-    assert read_table(tmp_path).equals(table)
+    assert read_table(tmp_path) == table
+    arrow = table.to_arrow(schema())
+    assert pa.parquet.read_table(tmp_path / "runs.parquet").equals(arrow)
     options = pa.csv.ConvertOptions(
-        column_types=schema(), strings_can_be_null=True, quoted_strings_can_be_null=False
+        column_types=arrow.schema, strings_can_be_null=True, quoted_strings_can_be_null=False
     )
     parsing = pa.csv.ParseOptions(newlines_in_values=True)
     again = pa.csv.read_csv(tmp_path / "runs.csv", convert_options=options, parse_options=parsing)
-    assert again.to_pylist() == table.to_pylist()
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["runs", "runs.csv", "runs.parquet"]
+    assert again.equals(arrow)
+    assert arrow.to_pylist() == table.rows()
+    assert sorted(path.name for path in tmp_path.iterdir()) == FILES
+
+
+def test_the_checksum_is_that_of_sha256sum(table, tmp_path):
+    digest = hashlib.sha256((tmp_path / "runs.csv").read_bytes()).hexdigest()
+    assert (tmp_path / "runs.csv.sha256").read_text() == f"{digest}  runs.csv\n"
+
+
+def test_without_pyarrow_there_is_no_parquet_and_none_of_another_table(results, tmp_path, monkeypatch):
+    rows = results(summary(), summary())
+    write_table(tmp_path, rows[:1])
+    assert (tmp_path / "runs.parquet").is_file()
+    monkeypatch.setitem(sys.modules, "pyarrow", None)
+    table = write_table(tmp_path, rows)
+    assert read_table(tmp_path) == table
+    assert len(table) == 2
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["runs", "runs.csv", "runs.csv.sha256"]
+    with pytest.raises(SurgsimError, match=r"^to_arrow needs pyarrow: pip install surgsim$"):
+        table.to_arrow(schema())
+
+
+KINDS = {"text": Kind.TEXT, "integer": Kind.INTEGER, "number": Kind.NUMBER, "truth": Kind.TRUTH}
+VALUES = st.fixed_dictionaries(
+    {
+        "text": st.none() | st.text(st.characters(exclude_categories=["Cs"])),
+        "integer": st.none() | st.integers(-(2**63), 2**63 - 1),
+        "number": st.none() | st.floats(allow_nan=False),
+        "truth": st.none() | st.booleans(),
+    }
+)
+
+
+@given(st.lists(VALUES))
+@example([{"text": ""}, {"text": 'a"b,c\r\nd'}, {"number": -0.0}, {"number": math.inf}, {}])
+def test_any_table_is_the_same_from_csv_and_from_parquet(rows):
+    table = Table.of_rows(rows, KINDS)
+    back = read_csv(csv_text(table).encode().decode(), KINDS)
+    assert repr(back) == repr(table)
+    content = pa.BufferOutputStream()
+    pa.parquet.write_table(table.to_arrow(KINDS), content)
+    columns = pa.parquet.read_table(pa.BufferReader(content.getvalue())).to_pydict()
+    assert repr({name: tuple(column) for name, column in columns.items()}) == repr(dict(back.columns))
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [("text", 1), ("integer", 1.0), ("integer", True), ("integer", 2**63), ("number", "1"), ("number", True)],
+)
+def test_a_value_of_another_kind_is_refused(name, value):
+    with pytest.raises(ValueError, match=f"column '{name}' is to hold"):
+        Table.of_rows([{name: value}], KINDS)
 
 
 def test_numbers_survive_the_csv_bit_for_bit(results, tmp_path):
@@ -136,8 +194,8 @@ def test_numbers_survive_the_csv_bit_for_bit(results, tmp_path):
     name = next(iter(METRICS))
     rows = results(*[summary(metrics={name: value}) for value in odd])
     write_table(tmp_path, rows)
-    back = pa.csv.read_csv(tmp_path / "runs.csv")[name].to_pylist()
-    assert back == odd
+    back = list(read_table(tmp_path)[name])
+    assert back == odd == pa.csv.read_csv(tmp_path / "runs.csv")[name].to_pylist()
     assert math.copysign(1.0, back[-1]) == -1.0
 
 
@@ -180,7 +238,7 @@ def test_metrics_of_the_wrong_kind_are_an_error_too(results, tmp_path, metrics):
 def test_a_folder_without_a_table(tmp_path):
     with pytest.raises(SurgsimError) as error:
         read_table(tmp_path)
-    text = f"{tmp_path} holds no runs.parquet: it is no folder of batch results"
+    text = f"{tmp_path} holds no runs.csv: it is no folder of batch results"
     assert str(error.value) == text
 
 
@@ -195,33 +253,46 @@ def test_a_batch_without_its_table_says_how_many_runs_are_there_and_counts_no_dr
     assert str(error.value) == f"{tmp_path}: the batch is not finished: 2 runs there, no table yet"
 
 
-def test_a_damaged_parquet(table, tmp_path):
-    path = tmp_path / "runs.parquet"
+def test_a_damaged_table(table, tmp_path):
+    path = tmp_path / "runs.csv"
     path.write_bytes(path.read_bytes()[:-20])
     with pytest.raises(SurgsimError) as error:
         read_table(tmp_path)
-    assert str(error.value).startswith(f"{path} is damaged: ")
-    assert "\n" not in str(error.value)
+    assert str(error.value) == f"{path} is damaged: it does not hold what `surgsim compare` wrote"
 
 
 def test_a_table_of_something_else(table, tmp_path):
-    path = tmp_path / "runs.parquet"
-    pa.parquet.write_table(table.drop_columns(["seed"]), path)
+    path = tmp_path / "runs.csv"
+    keep_table(tmp_path, table.without(["seed"]))
     with pytest.raises(SurgsimError) as error:
         read_table(tmp_path)
     assert str(error.value) == f"{path} has no column 'seed': it is not a table of this version"
-    pa.parquet.write_table(table.slice(0, 0), path)
+    keep_table(tmp_path, Table.of_rows([], schema()))
     with pytest.raises(SurgsimError) as error:
         read_table(tmp_path)
     assert str(error.value) == f"{path} has no rows"
 
 
 def test_a_metric_that_came_after_the_batch_is_null(table, tmp_path):
-    before = table.drop_columns(["tip_control_error_rms_mm"])
-    pa.parquet.write_table(sealed_table(before), tmp_path / "runs.parquet")
+    before = table.without(["tip_control_error_rms_mm"])
+    keep_table(tmp_path, before)
     found = read_table(tmp_path)
-    assert found["tip_control_error_rms_mm"].null_count == found.num_rows == table.num_rows
-    assert found.select(before.column_names).equals(before.replace_schema_metadata(None))
+    assert found["tip_control_error_rms_mm"] == (None,) * len(table)
+    assert list(found.columns) == list(schema())
+    assert found.without(["tip_control_error_rms_mm"]) == before
+
+
+def test_a_writer_that_ends_half_way_leaves_no_checksum_beside_another_table(table, tmp_path, monkeypatch):
+    def refuse(source, target):
+        if Path(target).name == "runs.parquet":
+            raise OSError(28, "No space left on device")
+        real(source, target)
+
+    real = os.replace
+    monkeypatch.setattr("surgsim.recording.files.os.replace", refuse)
+    with pytest.raises(SurgsimError, match="No space left"):
+        keep_table(tmp_path, table.without(["commit"]))
+    assert not (tmp_path / "runs.csv.sha256").exists()
 
 
 def test_shards_that_end_at_the_same_time_do_not_disturb_each_other(results, tmp_path, monkeypatch):
@@ -237,14 +308,13 @@ def test_shards_that_end_at_the_same_time_do_not_disturb_each_other(results, tmp
 
     monkeypatch.setattr("surgsim.recording.files.os.replace", replace)
     table = write_table(tmp_path, rows)
-    assert read_table(tmp_path).equals(table)
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["runs", "runs.csv", "runs.parquet"]
+    assert read_table(tmp_path) == table
+    assert sorted(path.name for path in tmp_path.iterdir()) == FILES
 
 
 def test_every_column_is_documented():
     whole = (Path(__file__).parents[2] / "docs" / "batch.md").read_text()
     page = whole.split("## What a results folder holds")[1]
-    kinds = {pa.string(): "text", pa.int64(): "integer", pa.float64(): "number", pa.bool_(): "truth value"}
     documented = dict(re.findall(r"^\| `(\w+)` \| (text|integer|number|truth value) \| .+ \|$", page, re.M))
-    assert documented == {field.name: kinds[field.type] for field in schema() if field.name not in METRICS}
+    assert documented == {name: kind.value for name, kind in schema().items() if name not in METRICS}
     assert [name for name in MACHINE_COLUMNS if f"`{name}`" not in whole] == []

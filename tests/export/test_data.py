@@ -7,6 +7,7 @@ import numpy as np
 import pyarrow.parquet as pq
 from scipy.io import loadmat, whosmat
 
+from surgsim.compare.table import read_table
 from surgsim.export.columns import matlab_names
 from surgsim.metrics.catalog import METRICS
 
@@ -64,7 +65,7 @@ def test_a_batch_has_a_row_for_each_run(made_results, told, tmp_path):
     files = [tmp_path / f"batch.{suffix}" for suffix in ("npz", "mat", "parquet")]
     words = [word for file in files for word in ("--data", file)]
     assert told(root, *words)[0] == 0
-    given = pq.read_table(root / "runs.parquet").to_pylist()
+    given = read_table(root).rows()
     table = pq.read_table(files[2])
     assert table.schema.field("rcm_error_rms_mm").metadata == {
         b"unit": b"mm",

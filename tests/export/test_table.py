@@ -4,10 +4,10 @@ import csv
 import re
 
 import numpy as np
-import pyarrow.parquet as pq
 import pytest
 
 from surgsim.compare.leaderboard import leaderboard
+from surgsim.compare.table import read_table
 from surgsim.export.paper_table import PaperColumn, PaperTable, comma_separated, markdown, tex, tex_text
 from surgsim.metrics.catalog import METRICS
 
@@ -22,7 +22,7 @@ def rows_of(file):
 def test_a_batch_has_the_leaderboards_rows_with_median_and_p95(made_results, told, tmp_path):
     root, file = made_results(), tmp_path / "controllers.csv"
     assert told(root, "--table", file, "--metric", f"{METRIC},tip_error_rms_mm")[0] == 0
-    table = pq.read_table(root / "runs.parquet")
+    table = read_table(root)
     wanted = leaderboard(table, METRIC)
     found = rows_of(file)
     assert [row["controller"] for row in found] == [row.controller for row in wanted]
@@ -36,7 +36,7 @@ def test_a_batch_has_the_leaderboards_rows_with_median_and_p95(made_results, tol
         assert float(row[f"{METRIC}_iqm"]) == board.value.value
         runs = [
             run[METRIC]
-            for run in table.to_pylist()
+            for run in table.rows()
             if run["controller"] == board.controller and run["outcome"] == "completed"
         ]
         values = np.sort([value for value in runs if value is not None])
@@ -52,7 +52,7 @@ def test_the_other_metrics_follow_the_rows_of_the_first(made_results, told, tmp_
     root, file = made_results(), tmp_path / "controllers.csv"
     other = "tip_error_rms_mm"
     assert told(root, "--table", file, "--metric", f"{METRIC},{other}")[0] == 0
-    table = pq.read_table(root / "runs.parquet")
+    table = read_table(root)
     by_name = {row.controller: row.value.value for row in leaderboard(table, other, places=False)}
     assert {row["controller"]: float(row[f"{other}_iqm"]) for row in rows_of(file)} == by_name
 

@@ -119,7 +119,7 @@ def batch_point(root: Path, n: int, stays_full: bool, table) -> tuple[list[str],
     kept = ("run_id", "outcome", "tip_error_rms_mm", "rcm_error_rms_mm")
     if resumed is None or any(resumed[name] != table[name] for name in kept):
         wrong.append("--resume gives another table")
-    if whole & {*again} or len(whole) + len(again) != table.num_rows:
+    if whole & {*again} or len(whole) + len(again) != len(table):
         wrong.append(f"--resume did {len(again)} runs, {len(whole)} were whole")
     return wrong, reached
 

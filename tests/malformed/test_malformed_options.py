@@ -98,7 +98,7 @@ OPTIONS = {
     f"tune vprnn --scenario {S} --budget 9 --out '\0'": "cannot be used: embedded null byte",
     "report nothing": "nothing is not a folder",
     "report scenario.yaml": "scenario.yaml is not a folder",
-    "report .": "holds no runs.parquet",
+    "report .": "holds no runs.csv",
     f"report {LONG}": "cannot be used: File name too long",
     "inspect nothing": "nothing: cannot be read: No such file or directory",
     "inspect .": "recording.rrd: cannot be read: No such file or directory",
@@ -109,7 +109,7 @@ OPTIONS = {
     "inspect pipe": "pipe: is not a file",
     "inspect loop": "loop: cannot be used: Too many levels of symbolic links",
     "inspect a b c": "inspect takes one recording, two, or a batch's folder",
-    "inspect . --run x": "holds no runs.parquet",
+    "inspect . --run x": "holds no runs.csv",
     "inspect scenario.yaml": "scenario.yaml: is not a rerun recording",
     "reproduce vprn": (
         "'vprn' is not a study. Known: bilateral_schemes, manipulability_validation, passive_teleoperation, "

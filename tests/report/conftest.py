@@ -6,10 +6,10 @@ import io
 from pathlib import Path
 
 import numpy as np
-import pyarrow.parquet as pq
 import pytest
 from PIL import Image
 
+from surgsim.compare.table import read_table
 from surgsim.metrics.catalog import METRICS
 from surgsim.report import scenes
 from surgsim.report.scenes import SceneView
@@ -56,7 +56,7 @@ def view(picture: str | None = PIXEL) -> SceneView:
 def wide_results(made_results, tmp_path_factory):
     """A results directory of twelve controllers with long names, each with every metric."""
     rng = np.random.default_rng(3)
-    given = pq.read_table(made_results() / "runs.parquet").to_pylist()
+    given = read_table(made_results()).rows()
     rows = []
     for row in (row for row in given if row["seed"] < 6):
         for k in range(3):

@@ -10,9 +10,10 @@ from pathlib import Path
 from urllib.parse import unquote
 
 import numpy as np
-import pyarrow.parquet as pq
 import pytest
 
+from surgsim.compare.columns import Table
+from surgsim.compare.table import keep_table, read_table, schema
 from surgsim.errors import Outcome, RecordingError, SurgsimError
 from surgsim.metrics.catalog import METRICS
 from surgsim.recording.read import Recorded
@@ -116,7 +117,7 @@ def test_links_lead_to_the_runs_folders_and_recordings(made):
 
 def test_failures_stand_beside_the_figures(made):
     folder, _, page = made
-    table = pq.read_table(folder / "runs.parquet").to_pylist()
+    table = read_table(folder).rows()
     failed = sum(row["outcome"] != "completed" for row in table)
     text = " ".join("".join(page.text).split())
     assert f"{failed} failed" in text
@@ -144,7 +145,7 @@ def test_the_same_table_gives_the_same_page(made_results):
 
 def test_size_stays_bounded_for_a_thousand_runs(tmp_path, made_up):
     file = write_report(made_up.make_results(tmp_path / "many", seeds=28))
-    assert pq.read_metadata(tmp_path / "many" / "runs.parquet").num_rows == 1008
+    assert len(read_table(tmp_path / "many")) == 1008
     assert file.stat().st_size < 1_500_000
 
 
@@ -222,25 +223,24 @@ def test_one_controller_and_one_seed_make_a_page_without_intervals(tmp_path, mad
 def test_what_is_no_results_folder_is_refused(made_results, tmp_path):
     with pytest.raises(SurgsimError, match="is not a folder; give the one that `surgsim compare` wrote"):
         write_report(tmp_path / "none")
-    with pytest.raises(SurgsimError, match=r"holds no runs\.parquet"):
+    with pytest.raises(SurgsimError, match=r"holds no runs\.csv"):
         write_report(tmp_path)
-    whole = (made_results() / "runs.parquet").read_bytes()
+    for name in ("runs.csv", "runs.csv.sha256"):
+        shutil.copy(made_results() / name, tmp_path)
+    whole = (tmp_path / "runs.csv").read_bytes()
     for damaged in (b"", b"x" * 100, whole[: len(whole) // 2], whole[:200] + b"\0" * 400 + whole[600:]):
-        (tmp_path / "runs.parquet").write_bytes(damaged)
+        (tmp_path / "runs.csv").write_bytes(damaged)
         with pytest.raises(SurgsimError, match="damaged"):
             write_report(tmp_path)
-    table = pq.read_table(made_results() / "runs.parquet")
-    pq.write_table(table.drop_columns(["seed"]), tmp_path / "runs.parquet")
+    table = read_table(made_results())
+    keep_table(tmp_path, table.without(["seed"]))
     with pytest.raises(SurgsimError, match="has no column 'seed'"):
         write_report(tmp_path)
-    pq.write_table(table.slice(0, 0), tmp_path / "runs.parquet")
+    keep_table(tmp_path, Table.of_rows([], schema()))
     with pytest.raises(SurgsimError, match="no rows"):
         write_report(tmp_path)
-    wrong = table.set_column(table.schema.get_field_index("scenario"), "scenario", table.column("seed"))
-    pq.write_table(wrong, tmp_path / "runs.parquet")
-    with pytest.raises(SurgsimError, match="column 'scenario' holds int64, not string"):
-        write_report(tmp_path)
-    pq.write_table(table, tmp_path / "runs.parquet")
+    (tmp_path / "runs.parquet").unlink()
+    keep_table(tmp_path, table)
     (tmp_path / "suite.json").write_text("{")
     with pytest.raises(SurgsimError, match=r"suite\.json is damaged"):
         write_report(tmp_path)
@@ -255,7 +255,7 @@ def test_command_line(made_results, tmp_path):
     assert json.loads(done.stdout) == {"report": str(out), "bytes": out.stat().st_size}
     refused = subprocess.run([*command, str(tmp_path)], capture_output=True, text=True, check=False)
     assert refused.returncode == 2
-    assert refused.stderr.startswith(f"surgsim: {tmp_path} holds no runs.parquet")
+    assert refused.stderr.startswith(f"surgsim: {tmp_path} holds no runs.csv")
 
 
 # Machado, Oliveira and Fernandes, IEEE TVCG 15(6), 2009: severity 1, on linear RGB.

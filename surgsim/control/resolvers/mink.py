@@ -14,6 +14,7 @@ from surgsim.control.resolvers.base import KernelResolver
 from surgsim.control.resolvers.rows import answer, fill_task_rows
 from surgsim.models.arm import ArmModel
 from surgsim.models.robot import joint_names
+from surgsim.packages import require
 from surgsim.tick.arrays import Record, Resolved, Seen
 from surgsim.tick.fields import Fields
 from surgsim.tick.mujoco_calls import mj_comPos, mj_kinematics
@@ -44,8 +45,17 @@ class MinkConfig(PartConfig):
     damping: PositiveFloat = 1e-9
     position_gain_per_s: PositiveFloat = 10.0
 
+    def check_installed(self) -> None:
+        """Refuse to go without mink.
+
+        Raises:
+            MissingPackageError: Where it is not installed.
+        """
+        require("the resolver 'mink' needs", "mink")
+
     def build(self, arm: ArmModel) -> KernelResolver:
         """The resolver."""
+        self.check_installed()
         solver, gains = MinkSolver(self, arm), np.zeros(LAW_SIZE)
         law, n = laid_over(Law, gains), arm.limits.q_min.size
         law.k_tip, law.k_rcm = self.k_tip, self.k_rcm

@@ -12,6 +12,7 @@ from surgsim.catalog import PartConfig
 from surgsim.columns import Block, scalar, vector
 from surgsim.compiled import compiled
 from surgsim.control.planes import PlaneConfig, fill_plane_rows, plane_numbers
+from surgsim.control.qp import check_package
 from surgsim.control.resolvers.base import KernelResolver
 from surgsim.control.resolvers.program import (
     OWN,
@@ -80,6 +81,14 @@ class PassiveQpConfig(PartConfig):
     tip_speed_max_m_per_s: PositiveFloat = 0.25
     lead_max_m: PositiveFloat = 0.001
     solver: Annotated[str, AfterValidator(check_solver)] = OWN
+
+    def check_installed(self) -> None:
+        """Refuse a solver that is not installed.
+
+        Raises:
+            MissingPackageError: Then.
+        """
+        check_package(self.solver)
 
     def build(self, arm: ArmModel) -> KernelResolver:
         """The resolver."""

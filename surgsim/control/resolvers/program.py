@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from surgsim.compiled import compiled
 from surgsim.control.qp import SHIPPED, DenseQp
 from surgsim.errors import unknown_name
+from surgsim.packages import lacking
 from surgsim.tick.arrays import Resolved, Seen
 from surgsim.tick.quadratic_program import SOLVED, solve
 
@@ -27,6 +28,8 @@ def check_solver(name: str) -> str:
     """
     if name in SHIPPED:
         return name
+    if line := lacking(f"the QP solver '{name}' needs", "qpsolvers", otherwise=", ".join(SHIPPED)):
+        raise ValueError(line)
     import qpsolvers  # half a second, and only the other solvers need it
 
     known = sorted({*SHIPPED, *qpsolvers.available_solvers})

@@ -11,6 +11,7 @@ from surgsim.catalog import PartConfig
 from surgsim.compiled import compiled
 from surgsim.control.manipulability import fill_log_manipulability_gradient
 from surgsim.control.planes import PlaneConfig, fill_plane_rows, plane_numbers
+from surgsim.control.qp import check_package
 from surgsim.control.resolvers.base import KernelResolver
 from surgsim.control.resolvers.program import (
     OWN,
@@ -61,6 +62,14 @@ class QpConfig(PartConfig):
     planes: tuple[PlaneConfig, ...] = ()
     plane_gain_per_s: PositiveFloat = 20.0
     solver: Annotated[str, AfterValidator(check_solver)] = OWN
+
+    def check_installed(self) -> None:
+        """Refuse a solver that is not installed.
+
+        Raises:
+            MissingPackageError: Then.
+        """
+        check_package(self.solver)
 
     def build(self, arm: ArmModel) -> KernelResolver:
         """The resolver."""

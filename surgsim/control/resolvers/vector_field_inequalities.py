@@ -12,6 +12,7 @@ from surgsim.columns import Block, scalar
 from surgsim.compiled import compiled
 from surgsim.control.barriers import entry_curvature
 from surgsim.control.planes import PlaneConfig, fill_plane_rows, plane_numbers
+from surgsim.control.qp import check_package
 from surgsim.control.resolvers.base import KernelResolver
 from surgsim.control.resolvers.program import (
     OWN,
@@ -65,6 +66,14 @@ class VectorFieldInequalitiesConfig(PartConfig):
     plane_gain_per_s: PositiveFloat = 20.0
     zones: tuple[ZoneConfig, ...] = ()
     solver: Annotated[str, AfterValidator(check_solver)] = OWN
+
+    def check_installed(self) -> None:
+        """Refuse a solver that is not installed.
+
+        Raises:
+            MissingPackageError: Then.
+        """
+        check_package(self.solver)
 
     def build(self, arm: ArmModel) -> KernelResolver:
         """The resolver; memory: the last q' (n,), sides of the last program."""
