@@ -16,12 +16,14 @@ import compared
 import numpy as np
 from ruamel.yaml import YAML
 
+from surgsim.compare.failures import WORST_RCM_MM
 from surgsim.compare.table import read_table
 
 ROOT = Path(__file__).resolve().parents[2]
 RESULTS = ROOT / "results" / "leaderboard"
 PAGES = (
     "docs/results.md",
+    "docs/protocol.md",
     "docs/robustness.md",
     "docs/drives.md",
     "docs/baselines.md",
@@ -232,6 +234,36 @@ def _cells(rows: Rows, name: str, at: Sequence[float]) -> list[str]:
     return ["; ".join(said)]
 
 
+def _robustness() -> str:
+    """For each disturbance the median RCM RMS at its lowest and highest level, and the first that fails."""
+    suite = YAML(typ="safe").load(ROOT / "scenarios" / "suites" / "robustness.yaml")
+    controllers = ("vprnn", "joint_impedance", "rcm_inverse_dynamics")
+    rows = {name: [row for row in rows_of("robustness") if row["controller"] == name] for name in controllers}
+    lines = []
+    for name, sweep in suite["sweeps"].items():
+        at = sweep["levels"]
+        cells = [_borne([row for row in rows[who] if name in levels(row)], name, at) for who in controllers]
+        lines.append([f"{sweep['label']}: {at[0]:g} … {at[-1]:g}", *cells])
+    return table(["disturbance", *(f"`{name}`" for name in controllers)], lines)
+
+
+def _borne(rows: Rows, name: str, at: Sequence[float]) -> str:
+    """Median RCM RMS at the ends of a sweep (a dash: no run completed), and the first level that fails."""
+    here = [[row for row in rows if np.isclose(levels(row)[name], level)] for level in at]
+    done = [[row["rcm_error_rms_mm"] for row in runs if row["outcome"] == "completed"] for runs in here]
+    ends = [f"{np.median(values):.3g}" if values else "–" for values in (done[0], done[-1])]
+    return f"{ends[0]} … {ends[1]}; {_first_failing(here, at)}"
+
+
+def _first_failing(here: Sequence[Rows], at: Sequence[float]) -> str:
+    for runs, level in zip(here, at, strict=True):
+        ended = {row["outcome"] for row in runs} - {"completed"}
+        worst = max(row["rcm_error_max_mm"] or 0.0 for row in runs)
+        if ended or worst > WORST_RCM_MM:
+            return f"**{level:g}**: " + (", ".join(sorted(ended)) if ended else f"{worst:.3g} mm")
+    return "holds"
+
+
 def _baselines() -> str:
     """A row for each controller over all arms: fewest failures first, then the smallest 95th percentile."""
     columns = [
@@ -294,6 +326,13 @@ FORCE = (("force RMS [N]", "trocar_force_rms_n"), ("max [N]", "trocar_force_max_
 VERDICTS = ("holds", "depends", "does not hold", "not comparable")
 
 
+def _protocol() -> str:
+    """What the protocol's leaderboard says of each track."""
+    page = (ROOT / "results" / "surgsim_v1" / "README.md").read_text(encoding="utf-8")
+    found = re.findall(r"^## Track (\w+)\n\n(.+)$", page, re.M)
+    return table(["track", "who comes furthest"], [[f"`{track}`", told] for track, told in found])
+
+
 def _studies() -> str:
     """How many claims of each study hold, counted in its page; the papers' and ours."""
     lines = []
@@ -314,8 +353,10 @@ TABLES: dict[str, Callable[[], str]] = {
     "coverage_of_rates": lambda: table(*compared.coverage_of_rates()),
     "nominal": _nominal,
     "studies": _studies,
+    "protocol": _protocol,
     "theatre_short": _theatre_short,
     "baselines": _baselines,
+    "robustness": _robustness,
     "drives_arms": _drives_arms,
     "drives_levels": _drives_levels,
     "theatre_ideal_lwr4plus": lambda: _theatre("lwr4plus"),

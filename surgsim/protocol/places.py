@@ -10,8 +10,13 @@ _KINDS = ("held", "done")
 
 
 def ordered(scores: Sequence[Score], protocol: ProtocolConfig) -> list[Score]:
-    """The furthest first: by levels held, then by runs that did their task; ties by name."""
-    return sorted(scores, key=lambda score: (*(-value for value, _ in _values(score, protocol)), score.name))
+    """By place; who shares one by levels held, then by runs that did their task, then by name."""
+    places = place_of(scores, protocol)
+
+    def key(score: Score) -> tuple[float | str, ...]:
+        return places[id(score)], *(-value for value, _ in _values(score, protocol)), score.name
+
+    return sorted(scores, key=key)
 
 
 def place_of(scores: Sequence[Score], protocol: ProtocolConfig) -> dict[int, int]:

@@ -6,6 +6,8 @@ from typing import Any
 from surgsim.display import count, number
 from surgsim.protocol.score import Score
 
+_NOTHING = 1e-12
+
 
 def sentence(score: Score) -> list[str]:
     """What is to be known first: failures, then where the axes end."""
@@ -42,9 +44,14 @@ def figure_told(figure: Mapping[str, Any]) -> tuple[str, str]:
     if value is None:
         return "-", (figure["note"] or "no value").partition(",")[0]
     if low is None and high is None:
-        return number(value, 3), ""
-    upper = "open" if high is None else number(high, 3)
-    return number(value, 3), f"{'open' if low is None else number(low, 3)} to {upper}"
+        return _told(value), ""
+    upper = "open" if high is None else _told(high)
+    return _told(value), f"{'open' if low is None else _told(low)} to {upper}"
+
+
+def _told(value: float) -> str:
+    """Three digits; what rounding left of a share of nothing is 0."""
+    return number(0.0 if abs(value) < _NOTHING else value, 3)
 
 
 def axis_told(axis: Mapping[str, Any]) -> str:

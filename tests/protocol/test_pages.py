@@ -140,6 +140,11 @@ def test_who_is_not_told_apart_shares_a_place(whole):
     places, best = place_of(scores, protocol.config), ordered(scores, protocol.config)
     assert [score.name for score in best] == ["a", "b", "c", "d"]
     assert [places[id(score)] for score in best] == [1, 1, 3, 4]
+    # Two steps below the margin are more than one: by levels alone, "low" would stand above "done".
+    scores = [like("high", 0.43, 0.62), like("low", 0.40, 0.62), like("done", 0.385, 0.71)]
+    places, best = place_of(scores, protocol.config), ordered(scores, protocol.config)
+    assert [score.name for score in best] == ["done", "high", "low"]
+    assert [places[id(score)] for score in best] == [1, 2, 2]
 
 
 def test_words_say_failures_first(whole):
@@ -153,5 +158,6 @@ def test_words_say_failures_first(whole):
         "6 of 9 runs failed",
     )
     assert figure_told({"value": 1.0, "low": 0.5, "high": None, "note": ""}) == ("1.00", "0.500 to open")
+    assert figure_told({"value": 0.0, "low": 2.8e-17, "high": 0.2, "note": ""}) == ("0", "0 to 0.200")
     assert tuning_told({"runs": None, "source": "unknown"}) == "not declared"
     assert tuning_told({"runs": 480, "source": "surgsim tune"}) == "480 runs, surgsim tune"
