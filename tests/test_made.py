@@ -137,7 +137,7 @@ def test_the_pages_of_the_leaderboard_say_what_their_rows_say(suite):
     told = summary(results.runs, metric, leaderboard(results.runs, metric))
     page = (results.folder / "report.html").read_text(encoding="utf-8")
     assert html.paragraph(told.first, "lead") in page, AGAIN
-    assert all(f": {html.escape(one.text)}.</li>" in page for one in told.failing), AGAIN
+    assert all(f" {html.escape(one.text)}.</li>" in page for one in told.failing), AGAIN
 
 
 @pytest.mark.parametrize("controller", ["constraint_consistent", "projected_jacobian"])
