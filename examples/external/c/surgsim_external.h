@@ -23,7 +23,7 @@
 #define SURGSIM_MOST_JOINTS 8
 #define SURGSIM_JOINT_VELOCITY 1
 #define SURGSIM_JOINT_TORQUE 2
-#define SURGSIM_HASH INT64_C(2344521692800102997)
+#define SURGSIM_HASH INT64_C(8764467204797176083)
 #define SURGSIM_HELLO INT64_C(8028911418491753043)
 #define SURGSIM_DECLARATION INT64_C(30508584609993299)
 #define SURGSIM_REQUEST INT64_C(118143297475155)
@@ -61,7 +61,7 @@ typedef struct {
     int64_t first; /* 1 at the first tick after a reset, else 0: the memory is all zeros then */
     int64_t has_trocar; /* 1 with a trocar, else 0 and nothing is said of it */
     int64_t rows; /* RCM rows: 2, or 0 without a trocar */
-    double depth; /* Insertion depth [m] */
+    double depth; /* Insertion depth of the shaft [m] */
     double roll_rate; /* Commanded turn about the shaft [rad/s] */
     double jaw; /* How far the jaws close, from 0 to 1 */
     double budget_j; /* Energy that may be given to the surroundings in this period; infinite: no limit [J] */
@@ -82,6 +82,8 @@ typedef struct {
     double R_WT[3][3]; /* Tip orientation; its third column is the shaft axis (3, 3) */
     double Jv_WT[3][8]; /* Translational tip Jacobian (3, n) [m/rad] */
     double Jw_WT[3][8]; /* Rotational tip Jacobian (3, n) */
+    double p_WS[3]; /* Place of the shaft's end: the tip of a straight instrument (3) [m] */
+    double Jv_WS[3][8]; /* Its translational Jacobian (3, n) [m/rad] */
     double z_W[8][3]; /* Joint axes as rows, unit (n, 3) */
     double anchors_W[8][3]; /* Points on the joint axes as rows (n, 3) [m] */
     double M[8][8]; /* Inertia with armature; not filled on the kinematic plant (n, n) [kg m^2] */
@@ -124,7 +126,7 @@ typedef struct {
 #ifndef __cplusplus
 _Static_assert(sizeof(surgsim_hello) == 64, "no gaps");
 _Static_assert(sizeof(surgsim_declaration) == 160, "no gaps");
-_Static_assert(sizeof(surgsim_request) == 2944, "no gaps");
+_Static_assert(sizeof(surgsim_request) == 3160, "no gaps");
 _Static_assert(sizeof(surgsim_reply) == 88, "no gaps");
 #endif
 
