@@ -276,5 +276,6 @@ def test_the_tools_path_stays_in_the_endoscopes_picture(robot):
         seen = axes.T @ (tip(t).p_WTd - place)
         assert seen[2] < -0.05
         assert np.arctan2(np.linalg.norm(seen[:2]), -seen[2]) < 0.8 * half
-    off_shaft = np.rad2deg(np.arccos(-axes[:, 2] @ scope.arm.kinematics(scope.q_start).R_WT[:, 2]))
+    shaft = scope.arm.kinematics(scope.q_start).R_WT[:, 2]
+    off_shaft = np.rad2deg(np.arctan2(np.linalg.norm(np.cross(axes[:, 2], shaft)), -axes[:, 2] @ shaft))
     assert off_shaft == pytest.approx({"lwr4plus": 0.0, "panda": 30.0}[robot], abs=0.01)
