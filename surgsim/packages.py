@@ -3,10 +3,11 @@
 import importlib.util
 import sys
 from collections.abc import Mapping
+from importlib.metadata import PackageNotFoundError, distribution
 
 from surgsim.errors import SurgsimError
 
-_PLAIN = "surgsim"
+_PLAIN, _SMALL = "surgsim", "surgsim-core"
 PACKAGES: Mapping[str, tuple[str, str]] = {
     "PIL": ("pillow", _PLAIN),
     "av": ("PyAV", "'surgsim[video]'"),
@@ -78,4 +79,16 @@ def missing(error: ModuleNotFoundError) -> MissingPackageError | None:
 def _line(what: str, module: str, otherwise: str = "") -> str:
     """`recordings need rerun-sdk: pip install surgsim, or --no-record`."""
     package, source = PACKAGES[module]
+    if _small():
+        extra = source.startswith("'")
+        source = source.replace("surgsim", _SMALL) if extra else f"{source} (pip uninstall {_SMALL} first)"
     return f"{what} {package}: pip install {source}" + (f", or {otherwise}" if otherwise else "")
+
+
+def _small() -> bool:
+    """Whether this is the small installation."""
+    try:
+        distribution(_SMALL)
+    except PackageNotFoundError:
+        return False
+    return True

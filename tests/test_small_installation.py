@@ -14,7 +14,7 @@ from batches import short_run
 import surgsim
 import surgsim.env
 from surgsim.cli.main import main
-from surgsim.packages import PACKAGES, MissingPackageError, missing
+from surgsim.packages import PACKAGES, MissingPackageError, lacking, missing
 
 ROOT = Path(surgsim.__file__).parents[1]
 CORE = tomllib.loads((ROOT / "core" / "pyproject.toml").read_text())
@@ -184,6 +184,16 @@ def test_a_part_whose_package_is_missing_says_so_in_one_line(module, without, tm
     told = capsys.readouterr().err
     assert re.sub(r"\s+", " ", told).endswith(f"{line} ")
     assert list(tmp_path.iterdir()) == []
+
+
+def test_the_small_one_says_what_comes_first(monkeypatch):
+    monkeypatch.setattr("surgsim.packages.distribution", lambda name: name)
+    for module in ("mink", "ray"):
+        monkeypatch.setitem(sys.modules, module, None)
+    assert lacking("it needs", "mink") == (
+        "it needs mink: pip install surgsim (pip uninstall surgsim-core first)"
+    )
+    assert lacking("it needs", "ray") == "it needs ray: pip install 'surgsim-core[ray]'"
 
 
 def test_every_part_that_is_left_out_is_tried_above():

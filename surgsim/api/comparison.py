@@ -123,7 +123,7 @@ class Comparison(Mapping[str, Run]):
         Raises:
             SurgsimError: If pandas is not installed.
         """
-        return self.table.to_pandas()
+        return self.table.to_pandas(schema())
 
     def to_arrow(self) -> "pa.Table":
         """The table as one of pyarrow, null where a run has nothing.

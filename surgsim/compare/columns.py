@@ -6,6 +6,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from surgsim.packages import require
 
 if TYPE_CHECKING:
@@ -77,8 +79,8 @@ class Table:
         """The table without some of its columns."""
         return Table({name: column for name, column in self.columns.items() if name not in names})
 
-    def to_pandas(self) -> "pd.DataFrame":
-        """The table as a data frame; NaN, or None in a text, where a row has nothing.
+    def to_pandas(self, schema: Schema) -> "pd.DataFrame":
+        """The table as a data frame; NaN in a number, or None in anything else, where a row has nothing.
 
         Raises:
             SurgsimError: If pandas is not installed.
@@ -86,7 +88,12 @@ class Table:
         require("to_pandas needs", "pandas")
         import pandas as pd
 
-        return pd.DataFrame({name: list(column) for name, column in self.columns.items()})
+        return pd.DataFrame(
+            {
+                name: np.array(column, dtype=np.float64) if schema[name] is Kind.NUMBER else list(column)
+                for name, column in self.columns.items()
+            }
+        )
 
     def to_arrow(self, schema: Schema) -> "pa.Table":
         """The table as one of pyarrow, null where a row has nothing.

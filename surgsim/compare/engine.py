@@ -13,6 +13,7 @@ from surgsim.compare.columns import Table
 from surgsim.compare.job import Job
 from surgsim.compare.suite import RunSpec, SuiteConfig, check_runs, expand
 from surgsim.compare.table import Row, write_table
+from surgsim.compare.unfinished import open_again
 from surgsim.compare.workers import Done, run_jobs
 from surgsim.errors import SurgsimError
 from surgsim.packages import RECORDING, require
@@ -87,6 +88,8 @@ def compare(batch: Batch, report: Report | None = None, runner: Runner = run_job
     if others:
         told = f"{len(others)} of {count} runs were made by other code ({others[0]}) and are run again"
         print(f"surgsim: {told}", file=sys.stderr)
+    if jobs:
+        open_again(batch.out)
     for done, result in enumerate(runner(jobs, batch.jobs), start=count - len(jobs) + 1):
         if report is not None:
             report(done, count, result.outcome)

@@ -30,7 +30,7 @@ class Kinematics:
 
     Attributes:
         p_WT: Tip position (3,) [m].
-        R_WT: Tip orientation (3, 3); its third column is the shaft axis, from adapter to tip.
+        R_WT: Tip orientation (3, 3); its third column is the shaft axis, away from the adapter.
         Jv_WT: Translational tip Jacobian (3, n) [m/rad].
         Jw_WT: Rotational tip Jacobian (3, n) [-].
         p_WS: Position of the shaft's end (3,) [m]: the tip of a straight instrument.

@@ -162,7 +162,7 @@ class HolderConfig(PartConfig):
 class InstrumentConfig(PartConfig):
     """Straight rigid laparoscopic shaft on an adapter, along the flange's z axis; or one from a file.
 
-    The tip is `adapter_length_m + shaft_length_m` from the flange.
+    The shipped shaft's tip is `adapter_length_m + shaft_length_m` from the flange.
 
     Attributes:
         name: An instrument's file that is shipped, on the search path, or of an installed package.

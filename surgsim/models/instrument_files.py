@@ -22,7 +22,7 @@ TEMPLATES = ("laparoscopic_straight",)
 """Files that are no instrument as they stand: their lengths are the scenario's."""
 SEARCH_PATH = "SURGSIM_INSTRUMENTS"
 GROUP = "surgsim.instruments"
-_ABOUT = re.compile(r"<!--\s*(.*?)[.:](?:\s|-->)", re.S)
+_COMMENT, _STOP = re.compile(r"<!--(.*?)-->", re.S), re.compile(r"[.:](?:\s|$)")
 
 
 def instrument_names() -> list[str]:
@@ -85,5 +85,6 @@ def instrument_description(name: str) -> str:
         text = file.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
         raise SurgsimError(f"instrument '{name}': {file} cannot be read: {error}") from error
-    about = _ABOUT.search(text)
-    return " ".join(about[1].split()) if about else "no description"
+    about = _COMMENT.search(text)
+    words = " ".join(about[1].split()) if about else ""
+    return _STOP.split(words, maxsplit=1)[0] or "no description"

@@ -1,6 +1,6 @@
 """The shaft in the cannula's bore: contact, funnel and seal friction.
 
-World frame; the shaft's axis runs from the entry E along the unit vector u over the length L to the tip; C is
+World frame; the shaft's axis runs from the entry E along the unit vector u over the length L to its end; C is
 the cannula's centre:
 
     s = u . (C - E),   rho n = (I - u u^T) (C - E),   |n| = 1

@@ -72,7 +72,7 @@ def _Q(v: Array, w: Array) -> Array:
     """Q (3, 3) [m] of a screw: translation `v` (3,) [m], rotation `w` (3,) [rad]."""
     t = float(np.linalg.norm(w))
     if t < 1e-5:
-        b, c, d = 1.0 / 6.0, -1.0 / 24.0, -1.0 / 60.0
+        b, c, d = 1.0 / 6.0, -1.0 / 24.0, 1.0 / 120.0
     else:
         s, k = np.sin(t), np.cos(t)
         b = (t - s) / t**3

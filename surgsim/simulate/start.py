@@ -74,7 +74,7 @@ def solve_start(
 
 def _near(reach: Reach, places: Array, posture: Array) -> Start | None:
     """The solution near the posture; None if there is none, or its path cannot be followed."""
-    from surgsim.simulate.posture import near_posture  # mink takes 0.3 s to import
+    from surgsim.simulate.posture import near_posture  # only this search needs the solver
 
     q = near_posture(reach, places[0], posture)
     if q is None or reach.p_WC is None:

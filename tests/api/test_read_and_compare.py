@@ -44,6 +44,7 @@ def test_its_table_and_its_leaderboard(batch):
     frame = found.to_pandas()
     assert isinstance(frame, pd.DataFrame)
     assert frame["outcome"].tolist() == list(found.table["outcome"]) == ["completed"] * 4
+    assert (frame["trocar_force_max_n"].dtype, frame["trocar_force_max_n"].isna().all()) == (float, True)
     board = found.leaderboard("tip_error_rms_mm")
     assert repr(board).startswith("Nobody wins by tip error")
     means = frame.groupby("controller")["tip_error_rms_mm"].mean()

@@ -20,6 +20,7 @@ from surgsim.compare.engine import Batch, compare
 from surgsim.compare.job import DiskError
 from surgsim.compare.suite import SuiteConfig
 from surgsim.compare.table import MACHINE_COLUMNS, read_table
+from surgsim.compare.unfinished import has_table
 from surgsim.compare.workers import run_jobs
 from surgsim.errors import SurgsimError
 from surgsim.recording.contents import fault_of
@@ -133,6 +134,19 @@ def test_what_is_whole_is_kept_and_what_is_missing_is_run(whole, tmp_path):
     assert seen == [(done, 8, "completed") for done in (5, 6, 7, 8)]
     assert all((folder / "metrics.json").stat().st_mtime_ns == when for folder, when in made.items())
     assert same(table, read_table(whole))
+
+
+def test_a_batch_that_is_gone_on_with_is_unfinished_until_it_is_whole(tmp_path):
+    out = tmp_path / "out"
+    compare(batch(out), runner=Here())
+    assert has_table(out)
+    (folder, *_) = (path.parent for path in out.glob("runs/*/*/[!.]*/metrics.json"))
+    spoil_json(folder)
+    with pytest.raises(KeyboardInterrupt):
+        compare(batch(out, resume=True), runner=stopping_after(0))
+    assert not has_table(out)
+    compare(batch(out, resume=True), runner=Here())
+    assert has_table(out)
 
 
 def spoil_json(folder):

@@ -56,6 +56,15 @@ def test_what_is_shipped_keeps_every_promise():
         assert instrument_description(name).startswith(("Rigid laparoscope of", "Electrocautery hook"))
 
 
+def test_its_first_comment_describes_it_with_or_without_a_stop(tmp_path, monkeypatch):
+    (tmp_path / "mine").mkdir()
+    monkeypatch.setenv("SURGSIM_INSTRUMENTS", str(tmp_path))
+    for comment, told in (("My hook", "My hook"), ("Mine. More", "Mine"), ("", "no description")):
+        text = f'<mujoco><!-- {comment} --><worldbody><geom pos="0. 0 0" size="1"/></worldbody></mujoco>'
+        (tmp_path / "mine" / "mine.xml").write_text(text, encoding="utf-8")
+        assert instrument_description("mine") == told
+
+
 def test_a_name_is_the_file_of_it():
     by_name, by_file = InstrumentConfig(name="hook_30"), InstrumentConfig(mjcf=str(HOOK))
     assert by_name.shaft_length_m == by_file.shaft_length_m

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from surgsim.compiled import compiled
 from surgsim.control.qp import SHIPPED, DenseQp
 from surgsim.errors import unknown_name
-from surgsim.packages import lacking
+from surgsim.packages import PACKAGES, installed, lacking
 from surgsim.tick.arrays import Resolved, Seen
 from surgsim.tick.quadratic_program import SOLVED, solve
 
@@ -28,7 +28,7 @@ def check_solver(name: str) -> str:
     """
     if name in SHIPPED:
         return name
-    if line := lacking(f"the QP solver '{name}' needs", "qpsolvers", otherwise=", ".join(SHIPPED)):
+    if line := lacking(f"the QP solver '{name}' needs", "qpsolvers", otherwise=", ".join(_here())):
         raise ValueError(line)
     import qpsolvers  # half a second, and only the other solvers need it
 
@@ -36,6 +36,11 @@ def check_solver(name: str) -> str:
     if name not in known:
         raise ValueError(unknown_name(name, "QP solver installed here", known))
     return name
+
+
+def _here() -> list[str]:
+    """The shipped solvers whose package is installed."""
+    return [name for name in SHIPPED if name not in PACKAGES or installed(name)]
 
 
 def examined(program: Program) -> dict[str, Array]:
