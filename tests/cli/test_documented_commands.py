@@ -67,8 +67,7 @@ SHORTER = {
     "surgsim compare drives --out runs/drives": "--controllers joint_elastic_dynamics --seeds 0:1",
     "surgsim compare breathing_tracked --out runs/breathing_tracked": f"{SHORT} --controllers vprnn",
     "surgsim compare breathing_hidden --out runs/breathing_hidden": f"{SHORT} --controllers vprnn",
-    "surgsim compare robustness --seeds 0:1 --controllers vprnn,joint_impedance,rcm_inverse_dynamics "
-    "--out runs/robustness": "--controllers vprnn",
+    "surgsim compare robustness --out runs/robustness": "--controllers vprnn --seeds 0:1",
     "surgsim compare circle_lwr4plus --controllers rcm_inverse_dynamics,joint_impedance,vprnn --seeds 0:5 "
     "--set 'disturbances=[{type: calibration_error}]' --out runs/calibration": f"{SHORT} --seeds 0:1",
     "surgsim compare circle_lwr4plus --controllers rcm_inverse_dynamics,rcm_elastic_dynamics,joint_impedance "
