@@ -16,8 +16,11 @@ import compared
 import numpy as np
 from ruamel.yaml import YAML
 
-from surgsim.compare.failures import WORST_RCM_MM
+from surgsim.compare.observations import Observations
 from surgsim.compare.table import read_table
+from surgsim.report.axes import sweeps_of
+from surgsim.report.failing import along, at_level
+from surgsim.report.results import read_results
 
 ROOT = Path(__file__).resolve().parents[2]
 RESULTS = ROOT / "results" / "leaderboard"
@@ -236,32 +239,23 @@ def _cells(rows: Rows, name: str, at: Sequence[float]) -> list[str]:
 
 def _robustness() -> str:
     """For each disturbance the median RCM RMS at its lowest and highest level, and the first that fails."""
-    suite = YAML(typ="safe").load(ROOT / "scenarios" / "suites" / "robustness.yaml")
-    controllers = ("vprnn", "joint_impedance", "rcm_inverse_dynamics")
-    rows = {name: [row for row in rows_of("robustness") if row["controller"] == name] for name in controllers}
+    results = read_results(RESULTS / "robustness")
+    sweeps, controllers = sweeps_of(results), ("vprnn", "joint_impedance", "rcm_inverse_dynamics")
     lines = []
-    for name, sweep in suite["sweeps"].items():
-        at = sweep["levels"]
-        cells = [_borne([row for row in rows[who] if name in levels(row)], name, at) for who in controllers]
-        lines.append([f"{sweep['label']}: {at[0]:g} … {at[-1]:g}", *cells])
+    for sweep in sweeps:
+        found = [along(results.runs.of_controller(name), sweep, sweeps)[1:] for name in controllers]
+        ends = f"{sweep.levels[0]:g} … {sweep.levels[-1]:g}"
+        lines.append([f"{sweep.label}: {ends}", *(_borne(at, sweep.levels) for at in found)])
     return table(["disturbance", *(f"`{name}`" for name in controllers)], lines)
 
 
-def _borne(rows: Rows, name: str, at: Sequence[float]) -> str:
+def _borne(at: Sequence[Observations], levels: Sequence[float]) -> str:
     """Median RCM RMS at the ends of a sweep (a dash: no run completed), and the first level that fails."""
-    here = [[row for row in rows if np.isclose(levels(row)[name], level)] for level in at]
-    done = [[row["rcm_error_rms_mm"] for row in runs if row["outcome"] == "completed"] for runs in here]
-    ends = [f"{np.median(values):.3g}" if values else "–" for values in (done[0], done[-1])]
-    return f"{ends[0]} … {ends[1]}; {_first_failing(here, at)}"
-
-
-def _first_failing(here: Sequence[Rows], at: Sequence[float]) -> str:
-    for runs, level in zip(here, at, strict=True):
-        ended = {row["outcome"] for row in runs} - {"completed"}
-        worst = max(row["rcm_error_max_mm"] or 0.0 for row in runs)
-        if ended or worst > WORST_RCM_MM:
-            return f"**{level:g}**: " + (", ".join(sorted(ended)) if ended else f"{worst:.3g} mm")
-    return "holds"
+    errors = [runs.values("rcm_error_rms_mm") for runs in (at[0], at[-1])]
+    ends = [f"{np.nanmedian(each):.3g}" if np.isfinite(each).any() else "–" for each in errors]
+    told = zip(levels, map(at_level, at), strict=True)
+    fails = next((f"**{level:g}**: {here.sentence}" for level, here in told if here.mark), "holds")
+    return f"{ends[0]} … {ends[1]}; {fails}"
 
 
 def _baselines() -> str:
