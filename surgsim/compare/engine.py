@@ -12,8 +12,7 @@ from surgsim.compare.axis import AxisConfig
 from surgsim.compare.columns import Table
 from surgsim.compare.job import Job
 from surgsim.compare.suite import RunSpec, SuiteConfig, check_runs, expand
-from surgsim.compare.table import Row, write_table
-from surgsim.compare.unfinished import open_again
+from surgsim.compare.table import Row, open_again, write_table
 from surgsim.compare.workers import Done, run_jobs
 from surgsim.errors import SurgsimError
 from surgsim.packages import RECORDING, require

@@ -140,13 +140,22 @@ def keep_table(root: Path, table: Table) -> None:
     copy = _parquet(table)
     seal = _seal(content)
     if _held(root / SEAL) != seal:  # never a whole checksum beside another table, whenever this ends
-        _remove(root / SEAL)
+        open_again(root)
     _write(root / CSV, content)
     if copy is None:
         _remove(root / PARQUET)
     else:
         _write(root / PARQUET, copy)
     _write(root / SEAL, seal)
+
+
+def open_again(root: Path) -> None:
+    """Take the checksum away before runs are done again: until they are, the table is of others.
+
+    Raises:
+        SurgsimError: If the disk refuses.
+    """
+    _remove(root / SEAL)
 
 
 def _write(path: Path, content: bytes) -> None:

@@ -3,7 +3,6 @@
 from pathlib import Path
 
 from surgsim.display import count
-from surgsim.errors import SurgsimError
 
 CSV, SEAL = "runs.csv", "runs.csv.sha256"
 """The table, and its checksum as `sha256sum` writes it: with that the batch is finished."""
@@ -12,18 +11,6 @@ CSV, SEAL = "runs.csv", "runs.csv.sha256"
 def has_table(root: Path) -> bool:
     """Whether `root` holds the table of a finished batch."""
     return (root / SEAL).is_file()
-
-
-def open_again(root: Path) -> None:
-    """Take the checksum away before runs are done again: until they are, the table is of others.
-
-    Raises:
-        SurgsimError: If the disk refuses.
-    """
-    try:
-        (root / SEAL).unlink(missing_ok=True)
-    except OSError as error:
-        raise SurgsimError(f"cannot write {root}: {error.strerror or error}") from error
 
 
 def unfinished(root: Path) -> str:
