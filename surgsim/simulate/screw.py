@@ -12,6 +12,7 @@ Source: Solà, Deray and Atchuthan, "A micro Lie theory for state estimation in 
 eqs. 174, 179 and 180.
 """
 
+import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
@@ -39,23 +40,10 @@ def tip_error(p_t: Array, p_WT: Array, R_WT: Array, Jv_WT: Array, Jw_WT: Array) 
 
 def rotation_vector(R: Array) -> Array:
     """Axis times angle (3,) [rad] of a rotation matrix (3, 3), the angle at most pi."""
-    x, y, z = 1.0 + 2.0 * np.diag(R) - np.trace(R)
-    w = 1.0 + np.trace(R)
-    # Four times each product of two parts of the quaternion; the row of the largest part is it, scaled.
-    products = np.array(
-        [
-            [w, R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]],
-            [R[2, 1] - R[1, 2], x, R[1, 0] + R[0, 1], R[0, 2] + R[2, 0]],
-            [R[0, 2] - R[2, 0], R[1, 0] + R[0, 1], y, R[2, 1] + R[1, 2]],
-            [R[1, 0] - R[0, 1], R[0, 2] + R[2, 0], R[2, 1] + R[1, 2], z],
-        ]
-    )
-    quaternion = products[int(np.argmax(np.diag(products)))]
-    quaternion = quaternion * (np.copysign(1.0, quaternion[0]) / np.linalg.norm(quaternion))
-    length = float(np.linalg.norm(quaternion[1:]))
-    if length < 1e-10:
-        return np.zeros(3)
-    return np.asarray(2.0 * np.arctan2(length, quaternion[0]) / length * quaternion[1:])
+    quaternion, w = np.zeros(4), np.zeros(3)
+    mujoco.mju_mat2Quat(quaternion, R.reshape(9))
+    mujoco.mju_quat2Vel(w, quaternion, 1.0)
+    return w
 
 
 def _inverse_left_jacobian(w: Array) -> Array:
