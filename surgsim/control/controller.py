@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import PositiveFloat
+from pydantic import NonNegativeFloat, PositiveFloat
 
 from surgsim.catalog import Name, PartConfig, Surroundings
 from surgsim.columns import Block, vector, width
@@ -22,7 +22,7 @@ from surgsim.control.port_estimators import PORT_ESTIMATORS
 from surgsim.control.port_estimators.base import PortEstimatorConfig
 from surgsim.control.port_estimators.measured import MeasuredPortConfig
 from surgsim.control.problem import Resolution
-from surgsim.control.redundancy import check_redundancy
+from surgsim.control.redundancy import check_redundancy, shares_null_space
 from surgsim.control.resolvers import RESOLVERS
 from surgsim.control.resolvers.base import ResolverConfig
 from surgsim.control.torque_laws import TORQUE_LAWS
@@ -58,6 +58,8 @@ class ControllerConfig(PartConfig):
         evaluate_at: Where the resolver's kinematics are evaluated: the `measured` joint positions, or the
             integrated `reference`, as a position-controlled arm would.
         position_gain_per_s: alpha of the bounds Omega: how fast a joint may approach its position limit.
+        limit_zone_rad: Within this of the end of a joint's range, null-space motion that leads away from it
+            is added to the resolver's answer, if the resolver shares its null space; 0: none is [rad].
     """
 
     name: Name
@@ -68,6 +70,7 @@ class ControllerConfig(PartConfig):
     instrument: AnyInstrumentEstimator = NominalInstrumentConfig()
     evaluate_at: Literal["measured", "reference"] = "measured"
     position_gain_per_s: PositiveFloat = 10.0
+    limit_zone_rad: NonNegativeFloat = 0.2
 
     def check(self, scenario: Surroundings) -> None:
         """Refuse a scenario that one of the parts does not fit."""
@@ -144,6 +147,7 @@ class Controller:
             has_law=self.parts.law is not None,
             corrects=getattr(self.parts.instrument, "corrects", True),
             omega_gain=config.position_gain_per_s,
+            limit_zone_rad=config.limit_zone_rad if shares_null_space(config.resolver) else 0.0,
             at_reference=config.evaluate_at == "reference",
         )
         self._bound = bind(self.parts, self.control, arm)

@@ -10,6 +10,7 @@ from numba import types
 
 from surgsim.compiled import call_at, compiled
 from surgsim.control.bounds import fill_velocity_bounds
+from surgsim.control.limit_avoidance import keep_from_limits
 from surgsim.control.rcm import fill_rcm
 from surgsim.tick.arrays import Control, Seen, World, type_of
 from surgsim.tick.nominal import copy_model, dynamics, kinematics
@@ -78,12 +79,15 @@ def decide(c: Control) -> int:
     c.who = SOLVER
     gains, memory = numbers(minds.resolver_gains), numbers(minds.resolver_memory)
     if c.at_reference:
-        status = call_at(minds.resolver, gains, _referred(c), memory, c.resolved)
+        asked = _referred(c)
     else:
         _bound(seen)
-        status = call_at(minds.resolver, gains, seen, memory, c.resolved)
+        asked = seen
+    status = call_at(minds.resolver, gains, asked, memory, c.resolved)
     if status != GOES_ON:
         return status
+    if c.limit_zone > 0.0:
+        keep_from_limits(c.limit_zone, asked, c.resolved)
     c.torque[:] = 0.0
     if c.has_law:
         c.who = LAW

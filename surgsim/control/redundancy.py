@@ -15,6 +15,15 @@ def redundancy_needed(config: object) -> int:
     return int(getattr(config, "needs_redundancy", 0))
 
 
+def shares_null_space(config: object) -> bool:
+    """Whether null-space motion may be added to the answers of the resolver of `config`.
+
+    A config says it as `shares_null_space`; False if it does not, as of one that plans the posture itself or
+    answers from outside surgsim.
+    """
+    return bool(getattr(config, "shares_null_space", False))
+
+
 def check_redundancy(
     config: ResolverConfig | TorqueLawConfig | None, arm: ArmModel, has_trocar: bool
 ) -> None:

@@ -487,6 +487,7 @@ class Control(Record):
         at_reference: Whether the resolver's kinematics are those of the joint reference.
         corrects: Whether the instrument estimator may correct the nominal model.
         who: Written: the part that a status other than GOES_ON came from.
+        limit_zone: From how near the ends of the joints' ranges the null space leads away [rad].
         q_ref: Joint reference at this tick (n,) [rad].
         torque: Sum of the law's terms (n,) [N m].
         correction: Twist of the corrected tip in the nominal tip's frame, rows linear [m] and angular [rad]
@@ -511,6 +512,7 @@ class Control(Record):
     at_reference: int
     corrects: int
     who: int
+    limit_zone: float
     q_ref: Array
     torque: Array
     correction: Array

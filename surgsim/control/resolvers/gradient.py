@@ -1,6 +1,6 @@
 """Gradient projection: climb the manipulability in the null space of the task."""
 
-from typing import Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +30,7 @@ class GradientConfig(PartConfig):
         rcm: Whether the RCM rows are stacked below the tip rows.
     """
 
+    shares_null_space: ClassVar[bool] = True
     type: Literal["gradient"] = "gradient"
     gain_rad2_per_s: NonNegativeFloat = 1.0
     k_tip: NonNegativeFloat = 5.0

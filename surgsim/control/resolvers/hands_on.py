@@ -14,7 +14,7 @@ from surgsim.control.inside import HEAD_SIZE, resolve_below
 from surgsim.control.joining import memory_size
 from surgsim.control.planes import PlaneConfig, plane_numbers
 from surgsim.control.port_force import split_wrench
-from surgsim.control.redundancy import redundancy_needed
+from surgsim.control.redundancy import redundancy_needed, shares_null_space
 from surgsim.control.resolvers import RESOLVERS
 from surgsim.control.resolvers.base import KernelResolver
 from surgsim.control.resolvers.pinv import PinvConfig
@@ -71,6 +71,11 @@ class HandsOnConfig(PartConfig):
     def needs_redundancy(self) -> int:
         """As much as the resolver below."""
         return redundancy_needed(self.resolver)
+
+    @property
+    def shares_null_space(self) -> bool:
+        """Whether the resolver below does."""
+        return shares_null_space(self.resolver)
 
     def check(self, scenario: Surroundings) -> None:
         """Refuse a scenario without the sensor that feels the hand."""

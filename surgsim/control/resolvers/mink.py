@@ -38,6 +38,7 @@ class MinkConfig(PartConfig):
         position_gain_per_s: How fast a joint may approach its position limit [1/s].
     """
 
+    shares_null_space: ClassVar[bool] = True
     type: Literal["mink"] = "mink"
     k_tip: NonNegativeFloat = 5.0
     k_rcm: NonNegativeFloat = 5.0

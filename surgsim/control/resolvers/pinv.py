@@ -1,6 +1,6 @@
 """Pseudo-inverse: the least joint velocity that moves the tip as asked."""
 
-from typing import Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +28,7 @@ class PinvConfig(PartConfig):
         rcm: Whether the RCM rows are stacked below the tip rows.
     """
 
+    shares_null_space: ClassVar[bool] = True
     type: Literal["pinv"] = "pinv"
     k_tip: NonNegativeFloat = 5.0
     k_rcm: NonNegativeFloat = 5.0

@@ -1,7 +1,7 @@
 """QP: inverse kinematics as a convex program with the RCM as a hard constraint."""
 
 from collections.abc import Mapping
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -51,6 +51,7 @@ class QpConfig(PartConfig):
         solver: `active_set`, `daqp`, `osqp`, or another solver that qpsolvers finds installed, by its name.
     """
 
+    shares_null_space: ClassVar[bool] = True
     type: Literal["qp"] = "qp"
     velocity_weight: PositiveFloat = 1.0
     slack_weight: PositiveFloat = 1e6

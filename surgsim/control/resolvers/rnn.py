@@ -1,7 +1,7 @@
 """RNN: the dynamic neural network of Jin et al. for manipulability optimisation."""
 
 import math
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,6 +40,7 @@ class RnnConfig(PartConfig):
         step_over_epsilon: Integration step of the network, in time constants.
     """
 
+    shares_null_space: ClassVar[bool] = True
     type: Literal["rnn"] = "rnn"
     c0: NonNegativeFloat = 1.0
     c1: NonNegativeFloat = 1.0

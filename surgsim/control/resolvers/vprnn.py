@@ -1,7 +1,7 @@
 """VPRNN: the varying-parameter recurrent neural network of the hierarchical-control paper (eq. 5-29)."""
 
 import math
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -55,6 +55,7 @@ class VprnnConfig(PartConfig):
         rcm_rows: `normal` uses two rows normal to the shaft, `cross` the three rank-2 rows of eq. (2).
     """
 
+    shares_null_space: ClassVar[bool] = True
     type: Literal["vprnn"] = "vprnn"
     h0: NonNegativeFloat = 0.1
     h1: PositiveFloat = 10.0
