@@ -71,7 +71,11 @@ def with_agent(
         inner: Any = _inner(own.resolver if resolver is None else resolver)
         asked = PolicyConfig(name=AGENT, action=action, resolver=inner, decimation=decimation)
     controller = ControllerConfig(
-        name=AGENT, resolver=asked, torque_law=law, position_gain_per_s=own.position_gain_per_s
+        name=AGENT,
+        resolver=asked,
+        torque_law=law,
+        position_gain_per_s=own.position_gain_per_s,
+        limit_zone_rad=own.limit_zone_rad,
     )
     return scenario.model_copy(update={"controller": controller})
 

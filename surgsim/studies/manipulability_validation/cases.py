@@ -90,7 +90,8 @@ class Cell(SimulatedCase):
         """The scenario.
 
         The bounds Omega let a joint come to its limit within one step (gain 1/T), so that they act only where
-        a joint would leave its range; self-motion keeps the default gain, with which it can brake in time.
+        a joint would leave its range; self-motion keeps the default gain, with which it can brake in time. The
+        paper's resolvers have no motion away from joint limits, so none is added.
         """
         form = {"form": self.form} if self.form else {}
         data = {
@@ -112,6 +113,7 @@ class Cell(SimulatedCase):
                 "name": self.method,
                 "resolver": {**RESOLVERS[self.method], **form, **dict(self.constants)},
                 "position_gain_per_s": 10.0 if self.method == "self_motion" else 1.0 / self.period_s,
+                "limit_zone_rad": 0.0,
             },
         }
         return Scenario.model_validate_json(json.dumps(data))
