@@ -90,8 +90,8 @@ class Cell(SimulatedCase):
         """The scenario.
 
         The bounds Omega let a joint come to its limit within one step (gain 1/T), so that they act only where
-        a joint would leave its range; self-motion keeps the default gain, with which it can brake in time. The
-        paper's resolvers have no motion away from joint limits, so none is added.
+        a joint would leave its range; self-motion keeps the default gain, with which it can brake in time.
+        The paper's resolvers have no motion away from joint limits, so none is added.
         """
         form = {"form": self.form} if self.form else {}
         data = {
