@@ -22,6 +22,8 @@ _SETTINGS = {
     "max_iter": 100_000,
     "polishing": False,  # it prints to standard output where no row is active
 }
+_FIRM_RHO = 10.0
+"""OSQP's rho for programs that it cannot end with the usual one: their bounds are far from the optimum."""
 _TINY = 1e-9
 _INFINITE = 1e30
 
@@ -88,6 +90,12 @@ class Osqp:
             return p.x_e if (p.low <= _TINY).all() and (p.high >= -_TINY).all() else None
         self._load(p)
         result = self._model.solve(raise_error=False)
+        if result.info.status_val == osqp.SolverStatus.OSQP_MAX_ITER_REACHED:
+            self._model = None  # from the start, where the last answer leads nowhere
+            self._load(p)
+            self._model.update_settings(rho=_FIRM_RHO)
+            result = self._model.solve(raise_error=False)
+            self._model = None
         if result.info.status_val != osqp.SolverStatus.OSQP_SOLVED:
             return None
         self._x = p.x_e + p.basis @ result.x
