@@ -29,10 +29,11 @@ from surgsim.teleop.bilateral.base import BilateralConfig
 from surgsim.teleop.bilateral.ends import describe_law
 from surgsim.teleop.bilateral.passive_convex import PassiveConvexConfig
 from surgsim.teleop.channel import DRAW, Channel, ChannelConfig, draw_packets
-from surgsim.teleop.console import Console, ConsoleConfig
-from surgsim.teleop.mapping import MappingConfig, align
+from surgsim.teleop.console import Console, ConsoleConfig, home_room_rad
+from surgsim.teleop.hand import Hand, fill_action
+from surgsim.teleop.mapping import MappingConfig, align, describe_mapping
 from surgsim.teleop.messages import TANK
-from surgsim.teleop.operator import Goal, Hand, OperatorConfig, describe_operator, fill_action, goal_rows
+from surgsim.teleop.operator import Goal, OperatorConfig, describe_operator, goal_rows
 from surgsim.teleop.receiver import ReceiverConfig, expect
 from surgsim.teleop.tank import fill_tank
 from surgsim.teleop.teleoperator import (
@@ -109,9 +110,16 @@ class TeleoperationConfig(PartConfig):
         """Refuse what does not fit the rest of the scenario.
 
         Raises:
-            ValueError: If the console's steps do not fit the control period, or the board is not in `props`.
+            ValueError: If the console's steps do not fit the control period, the console has no room for the
+                clutch's margin, or the board is not in `props`.
         """
         self.console.substeps(scenario.control_period_s)
+        margin, room = self.operator.clutch.stop_margin_rad, home_room_rad()
+        if margin >= room:
+            raise ValueError(
+                f"operator.clutch.stop_margin_rad {margin:g} must be below {room:.3g}, "
+                "the way from the console's home pose to its nearest stop"
+            )
         if self.program != "peg_and_ring":
             return
         boards = [prop for prop in scenario.props if isinstance(prop, PegBoardLayout)]
@@ -194,7 +202,7 @@ class Teleoperation:
         laid_over(Law, self.gains).force_share = time_s / self._period
 
     def _describe(self, lives: Sequence[int]) -> None:
-        """Fill the numbers; those of the mapping and of the hand come with `reset`."""
+        """Fill the numbers; the mapping and what is of the hand come with `reset`."""
         c, law, at = self._c, laid_over(Law, self.gains), self._places
         near, far = law.operator, law.remote
         law.hold_end_s, law.start[:], law.force_share = c.hold_end_s, self._start, 1.0
@@ -214,6 +222,8 @@ class Teleoperation:
         self._noise_m = describe_operator(near.operator, c.operator, self._period, round_trip)
         near.operator.goals, near.operator.goal_count = LAW_SIZE, len(self._goals)
         near.operator.tremor, near.operator.scatter = at.tremor, at.scatter
+        describe_mapping(near.mapping, c.mapping, self._period)
+        near.operator.clutch.fade_s = c.mapping.clutch_fade_s
         lines = (
             (law.forth, far.receiver, at.forth_draws, at.forth_ring, at.forth_taken),
             (law.back, near.receiver, at.back_draws, at.back_ring, at.back_taken),
@@ -237,7 +247,7 @@ class Teleoperation:
         state, memory = laid_over(State, self.memory), self.memory
         near, far = state.operator, state.remote
         self._console.reset(law.operator.console, near.console)
-        align(law.operator.operator.mapping, c.mapping, near.console.state.position, self._start)
+        align(near.mapping, c.mapping, near.console.state.position, self._start)
         state.ends = bool(self._goals) or self._hand is not None
         near.in_python = self._hand is not None
         near.of_scheme = far.of_scheme = self._scheme is not None

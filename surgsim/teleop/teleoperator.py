@@ -232,5 +232,5 @@ def _record(law: Law, state: State, t_s: float, values: Array) -> None:
     fill_remote_columns(remote, values[_REMOTE:])
     fill_account(law.operator, operator, law.remote, remote, state.forth, state.back, values[_ACCOUNT:])
     velocity = operator.console.state.velocity
-    motion_to_remote(law.operator.operator.mapping, velocity, values[_ISSUED : _ISSUED + 3])
+    motion_to_remote(operator.mapping, velocity, values[_ISSUED : _ISSUED + 3])
     values[_AGE] = t_s - remote.receiver.sent_s if remote.receiver.highest >= 0 else math.nan

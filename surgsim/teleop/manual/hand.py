@@ -6,10 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surgsim.teleop.console import ConsoleState
+from surgsim.teleop.hand import HandCommand
 from surgsim.teleop.impedance import Grip, hand_wrench
 from surgsim.teleop.manual.intent import Intent, Source
 from surgsim.teleop.mapping import MappingConfig, rotation_matrix
-from surgsim.teleop.operator import HandCommand, OperatorConfig
+from surgsim.teleop.operator import OperatorConfig
 from surgsim.tick.arrays import new
 from surgsim.tick.overlay import take
 
