@@ -33,7 +33,7 @@ from surgsim.teleop.console import Console, ConsoleConfig, home_room_rad
 from surgsim.teleop.hand import Hand, fill_action
 from surgsim.teleop.mapping import MappingConfig, align, describe_mapping
 from surgsim.teleop.messages import TANK
-from surgsim.teleop.operator import Goal, OperatorConfig, describe_operator, goal_rows
+from surgsim.teleop.operator import GOAL, Goal, OperatorConfig, describe_operator, goal_rows
 from surgsim.teleop.receiver import ReceiverConfig, expect
 from surgsim.teleop.tank import fill_tank
 from surgsim.teleop.teleoperator import (
@@ -154,7 +154,7 @@ class Teleoperation:
 
     Attributes:
         kernel: status = kernel(gains, feedback, memory, out).
-        gains: Its numbers: a `Law`, then the goals' rows.
+        gains: Its numbers: a `Law`, then the rows of the goals and of the mapping's changes, then a scheme's.
         memory: Its memory: a `State`, then the tables of `places`.
     """
 
@@ -179,7 +179,8 @@ class Teleoperation:
         packets = [(life, copies(channel)) for life, channel in zip(lives, self._channels, strict=True)]
         self._places = places(packets, ends)
         own = self._scheme.gains if self._scheme else np.zeros(0)
-        self.gains = np.concatenate([np.zeros(LAW_SIZE), goal_rows(self._goals).ravel(), own])
+        rows = (goal_rows(self._goals).ravel(), config.mapping.change_rows().ravel())
+        self.gains = np.concatenate([np.zeros(LAW_SIZE), *rows, own])
         self.memory = np.zeros(self._places.end)
         self._describe(lives)
         self.reset()
@@ -223,6 +224,7 @@ class Teleoperation:
         near.operator.goals, near.operator.goal_count = LAW_SIZE, len(self._goals)
         near.operator.tremor, near.operator.scatter = at.tremor, at.scatter
         describe_mapping(near.mapping, c.mapping, self._period)
+        near.mapping.changes = LAW_SIZE + GOAL * len(self._goals)
         near.operator.clutch.fade_s = c.mapping.clutch_fade_s
         lines = (
             (law.forth, far.receiver, at.forth_draws, at.forth_ring, at.forth_taken),

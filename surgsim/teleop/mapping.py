@@ -1,28 +1,38 @@
 """Alignment of the console with the remote world, and the force law written in it."""
 
 import math
+from itertools import pairwise
 from typing import ClassVar, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
-from pydantic import PositiveFloat, model_validator
+from pydantic import NonNegativeFloat, PositiveFloat, model_validator
 
 from surgsim.catalog import PartConfig
 from surgsim.compiled import compiled
 from surgsim.tick.arrays import Array, Record
 
 
+class ScaleChangeConfig(PartConfig):
+    """From `at_s` on the motion scaling goes to `scale`."""
+
+    at_s: NonNegativeFloat
+    scale: PositiveFloat
+
+
 class MappingConfig(PartConfig):
     """Motion scaling and rotation between console and remote world.
 
     `scale` is remote motion over handle motion; `rotation_wxyz` turns console axes O into world axes W.
-    `clutch_fade_s` is how long the clutch takes to open or close, which keeps the command free of steps: an
-    assumption.
+    `scale_changes` change it during a run, each within `scale_ramp_s`. `clutch_fade_s` is how long the clutch
+    takes to open or close. Both keep the command free of steps, and are assumptions.
     """
 
     scale: PositiveFloat = 0.5
     rotation_wxyz: tuple[float, float, float, float] = (1.0, 0.0, 0.0, 0.0)
     clutch_fade_s: PositiveFloat = 0.1
+    scale_changes: tuple[ScaleChangeConfig, ...] = ()
+    scale_ramp_s: PositiveFloat = 0.5
 
     @model_validator(mode="after")
     def _quaternion_is_unit(self) -> Self:
@@ -30,6 +40,18 @@ class MappingConfig(PartConfig):
         if abs(norm - 1.0) > 1e-6:
             raise ValueError(f"rotation_wxyz must have norm 1, not {norm:g}")
         return self
+
+    @model_validator(mode="after")
+    def _changes_are_in_order(self) -> Self:
+        times = [change.at_s for change in self.scale_changes]
+        for before, after in pairwise(times):
+            if after <= before:
+                raise ValueError(f"scale_changes must be in order of time, not at_s {before:g}, {after:g}")
+        return self
+
+    def change_rows(self) -> Array:
+        """When each change begins [s] and where it leads to (k, 2)."""
+        return np.array([(change.at_s, change.scale) for change in self.scale_changes]).reshape(-1, 2)
 
 
 def rotation_matrix(wxyz: ArrayLike) -> Array:
@@ -49,9 +71,17 @@ class MappingLaw(Record):
 
     Attributes:
         fade_step: Share of the clutch's way from open to closed that it makes in a period.
+        scale: Motion scaling at first.
+        ramp_s: How long a change of it takes [s].
+        changes: Where the rows of its changes begin in the gains.
+        change_count: How many there are.
     """
 
     fade_step: float
+    scale: float
+    ramp_s: float
+    changes: int
+    change_count: int
 
 
 class Mapping(Record):
@@ -85,26 +115,43 @@ def align(mapping: Mapping, config: MappingConfig, home_O: ArrayLike, home_W: Ar
 
 
 def describe_mapping(law: MappingLaw, config: MappingConfig, period_s: float) -> None:
-    """Fill the numbers for a control period [s]."""
+    """Fill the numbers for a control period [s], but for where the changes are."""
     law.fade_step = period_s / config.clutch_fade_s
+    law.scale, law.ramp_s, law.change_count = config.scale, config.scale_ramp_s, len(config.scale_changes)
 
 
 @compiled
-def remap(law: MappingLaw, mapping: Mapping, p_O: Array, opens: int) -> None:
-    """Let the clutch go on to open or close, for the period that begins with the handle at `p_O` (3,) [m].
+def scale_at(law: MappingLaw, gains: Array, t_s: float) -> float:
+    """Motion scaling at a time [s]: half a cosine from one scale to the next, continuous if they overlap."""
+    scale = law.scale
+    for k in range(law.change_count):
+        begin_s, wanted = gains[law.changes + 2 * k], gains[law.changes + 2 * k + 1]
+        gone = (t_s - begin_s) / law.ramp_s
+        if gone >= 1.0:
+            scale = wanted
+        elif gone > 0.0:
+            scale += 0.5 * (1.0 - math.cos(math.pi * gone)) * (wanted - scale)
+    return scale
+
+
+@compiled
+def remap(law: MappingLaw, gains: Array, mapping: Mapping, t_s: float, p_O: Array, opens: int) -> None:
+    """Let clutch and scale go on, for the period that begins at `t_s` [s] with the handle at `p_O` (3,) [m].
 
     The gain g = e s holds for a period, and the mapping gets a new offset with every new g, so that the tip
     it stands for moves by g R_WO dp_O and never steps. Forces are passed on by the same g: a transformer of
     changing ratio, which makes and takes no energy at any g.
     """
     closed = min(max(mapping.closed + (-law.fade_step if opens else law.fade_step), 0.0), 1.0)
-    if closed == mapping.closed:
+    scale = scale_at(law, gains, t_s)
+    if closed == mapping.closed and scale == mapping.scale:
         return
     told = np.empty(3)
     to_remote(mapping, p_O, told)
     for i in range(3):
         mapping.home_O[i], mapping.home_W[i] = p_O[i], told[i]
-    mapping.closed, mapping.engaged = closed, 0.5 * (1.0 - math.cos(math.pi * closed))
+    mapping.scale, mapping.closed = scale, closed
+    mapping.engaged = 0.5 * (1.0 - math.cos(math.pi * closed))
 
 
 @compiled

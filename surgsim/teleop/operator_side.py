@@ -56,6 +56,7 @@ OPERATOR_COLUMNS = (
     scalar("operator_done"),
     scalar("handle_stop"),
     scalar("clutch_engaged"),
+    scalar("motion_scale"),
 )
 
 
@@ -291,7 +292,7 @@ def step_operator_side(
     Returns:
         A status, and the energy to be sent [J].
     """
-    remap(law.mapping, side.mapping, side.console.state.position, side.hand.clutch)
+    remap(law.mapping, gains, side.mapping, side.t_s, side.console.state.position, side.hand.clutch)
     received = receive_at_operator(law, side, line, channel, memory)
     status = GOES_ON
     if law.passivity == SCHEME:
@@ -343,7 +344,7 @@ def fill_operator_columns(side: OperatorSide, out: Array) -> None:
         out[15 + i], out[18 + i] = handle.position[i], handle.velocity[i]
         out[21 + i], out[24 + i], out[27 + i] = side.wrench[i], hand.wrench[i], hand.intended[i]
     out[30], out[31], out[32], out[33] = hand.jaw, hand.goal, hand.missed, hand.done
-    out[34], out[35] = handle.stop, side.mapping.engaged
+    out[34], out[35], out[36] = handle.stop, side.mapping.engaged, side.mapping.scale
     if side.of_scheme:
         end = side.end
         out[0], out[1], out[2], out[5] = end.stored_j, end.burnt_j, end.deficit_j, end.observed_j

@@ -3,7 +3,8 @@
         x_o, v_o, jaw ── channel ──▶ v_d = trust (v + k (x - p_WT)),  budget T - epsilon ──▶ controller
         hand ◀── K_v (p_WT(t - delta) - x_o) ◀── channel ── p_WT, force, energy ◀── arm
 
-The numbers are a `Law`, then the goals' rows; the memory is a `State`, then the tables of `Places`.
+The numbers are a `Law`, then the rows of goals and of changes of scale; the memory is a `State`, then the
+tables of `Places`.
 """
 
 import math
@@ -52,7 +53,7 @@ DRAWN = 1024
 
 
 class Law(Record):
-    """All numbers of a teleoperation but the goals.
+    """All numbers of a teleoperation but the goals and the changes of scale.
 
     Attributes:
         hold_end_s: Time at rest after the operator is done [s].

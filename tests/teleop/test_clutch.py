@@ -48,7 +48,7 @@ def test_what_the_handle_stands_for_is_the_integral_of_what_is_passed_on():
     handle = np.array([0.4, 0.1, 0.6]) + 0.02 * np.sin(np.outer(times, [9.0, 5.0, 7.0]))
     told, power, engaged = [], [], []
     for p, after in itertools.pairwise(handle):
-        remap(law, mapping, p, int(100 <= len(told) < 250))
+        remap(law, np.zeros(0), mapping, 0.0, p, int(100 <= len(told) < 250))
         before, now, force, f_W = np.zeros(3), np.zeros(3), np.zeros(3), np.array([1.0, -2.0, 0.5])
         to_remote(mapping, p, before)
         to_remote(mapping, after, now)
@@ -69,7 +69,7 @@ def test_what_the_handle_stands_for_is_the_integral_of_what_is_passed_on():
 def test_a_clutch_that_stays_closed_changes_no_number():
     law, mapping = mapping_of(SMALL)
     before = mapping.copy()
-    remap(law, mapping, np.array([0.5, 0.2, 0.7]), 0)
+    remap(law, np.zeros(0), mapping, 0.0, np.array([0.5, 0.2, 0.7]), 0)
     assert mapping == before
     velocity = np.zeros(3)
     motion_to_remote(mapping, np.array([0.1, 0.0, 0.0]), velocity)
