@@ -1,9 +1,18 @@
-"""How the console was operated: the clutch. Undefined (NaN) for a trace of another task."""
+"""How the console was operated: the clutch, and tremor. Undefined (NaN) for a trace of another task."""
+
+import math
 
 import numpy as np
+from numpy.typing import NDArray
 
 from surgsim.metrics.metric import CHOICE, Metric, with_block
+from surgsim.metrics.teleoperation import tip_velocity
 from surgsim.trace.trace import Trace
+
+Array = NDArray[np.float64]
+TREMOR_HZ = (8.0, 12.0)
+"""Band of physiological tremor: Lakie et al., J. Physiol. 593(19), 2015."""
+_SHORTEST_S = 1.0
 
 
 def clutchings(trace: Trace) -> float:
@@ -17,7 +26,50 @@ def clutch_open_fraction(trace: Trace) -> float:
     return float(np.mean(trace["clutch_engaged"] < 1.0))
 
 
+def tremor_rms(velocity: Array, period_s: float) -> float:
+    """RMS of the motion in the band of tremor, from its velocity (rows, 3) [m]; NaN for less than a second.
+
+    Each frequency of the velocity under a Hann window, over 2 pi f: a movement's own spectrum is small there.
+    """
+    rows = len(velocity)
+    if rows * period_s < _SHORTEST_S:
+        return math.nan
+    window = np.hanning(rows)
+    frequency = np.fft.rfftfreq(rows, period_s)
+    inside = (frequency >= TREMOR_HZ[0]) & (frequency <= TREMOR_HZ[1])
+    spectrum = np.fft.rfft(velocity * window[:, None], axis=0)[inside]
+    power = 2.0 * np.abs(spectrum / (2.0 * np.pi * frequency[inside, None])) ** 2
+    return math.sqrt(float(power.sum()) / (rows * float(np.sum(window**2))))
+
+
+def tremor_at_tip(trace: Trace) -> float:
+    """RMS of the tip's motion in the band of tremor [m]."""
+    return tremor_rms(tip_velocity(trace), trace.meta.control_period_s)
+
+
+def tremor_transmission(trace: Trace) -> float:
+    """The same over that of the tip for which the handle stands."""
+    handle = tremor_rms(trace.block("velocity_issued"), trace.meta.control_period_s)
+    return tremor_at_tip(trace) / handle if handle > 0.0 else math.nan
+
+
 METRICS = (
+    Metric(
+        name="tremor_tip_rms_mm",
+        heading="tremor at the tip, RMS [mm]",
+        matters=0.01,
+        matters_source=CHOICE,
+        meaning="RMS of the tip's motion from 8 to 12 Hz, in a teleoperation",
+        compute=with_block("velocity_issued", lambda trace: 1e3 * tremor_at_tip(trace), rows=2),
+    ),
+    Metric(
+        name="tremor_transmission",
+        heading="tremor at the tip over that of the handle",
+        matters=0.01,
+        matters_source=CHOICE,
+        meaning="tremor at the tip over that of the motion which the handle stands for",
+        compute=with_block("velocity_issued", tremor_transmission, rows=2),
+    ),
     Metric(
         name="clutchings",
         heading="times the clutch was opened",

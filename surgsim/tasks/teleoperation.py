@@ -46,6 +46,7 @@ from surgsim.teleop.teleoperator import (
     places,
     teleoperate,
 )
+from surgsim.teleop.tremor_filter import TremorFilterConfig, describe_filter
 from surgsim.tick.arrays import Command, task_signature
 from surgsim.tick.blank import new_command, new_feedback
 from surgsim.tick.overlay import laid_over, take
@@ -76,6 +77,7 @@ class TeleoperationConfig(PartConfig):
         operator: Eyes, decisions and hand.
         console: The master console.
         mapping: Motion scaling and rotation between console and world.
+        tremor_filter: What takes tremor off what the handle tells the remote side.
         channel: The channel to the remote side, and the one back unless `channel_back` is given.
         channel_back: The channel back; null: as `channel`.
         video: The channel of the picture that the operator sees; null: it comes with the tip's state, by the
@@ -95,6 +97,7 @@ class TeleoperationConfig(PartConfig):
     operator: OperatorConfig = OperatorConfig()
     console: ConsoleConfig = ConsoleConfig()
     mapping: MappingConfig = MappingConfig()
+    tremor_filter: TremorFilterConfig = TremorFilterConfig()
     channel: ChannelConfig = ChannelConfig()
     channel_back: ChannelConfig | None = None
     video: ChannelConfig | None = None
@@ -106,14 +109,24 @@ class TeleoperationConfig(PartConfig):
             raise ValueError("program 'peg_and_ring' makes its own goals: leave goals out")
         return self
 
+    @model_validator(mode="after")
+    def _filter_fits_the_scheme(self) -> Self:
+        if self.tremor_filter.type != "none" and self.bilateral.type != "passive_convex":
+            raise ValueError(
+                "a tremor_filter needs the bilateral scheme 'passive_convex', whose tanks book the work at "
+                f"the handle: '{self.bilateral.type}' takes what the handle tells for the motion of its port"
+            )
+        return self
+
     def check(self, scenario: Surroundings) -> None:
         """Refuse what does not fit the rest of the scenario.
 
         Raises:
-            ValueError: If the console's steps do not fit the control period, the console has no room for the
-                clutch's margin, or the board is not in `props`.
+            ValueError: If the console's steps do not fit the control period, the tremor filter does not fit
+                it, the console has no room for the clutch's margin, or the board is not in `props`.
         """
         self.console.substeps(scenario.control_period_s)
+        self.tremor_filter.sampled(scenario.control_period_s)
         margin, room = self.operator.clutch.stop_margin_rad, home_room_rad()
         if margin >= room:
             raise ValueError(
@@ -224,6 +237,7 @@ class Teleoperation:
         near.operator.goals, near.operator.goal_count = LAW_SIZE, len(self._goals)
         near.operator.tremor, near.operator.scatter = at.tremor, at.scatter
         describe_mapping(near.mapping, c.mapping, self._period)
+        describe_filter(near.tremor_filter, c.tremor_filter, self._period)
         near.mapping.changes = LAW_SIZE + GOAL * len(self._goals)
         near.operator.clutch.fade_s = c.mapping.clutch_fade_s
         lines = (

@@ -24,6 +24,7 @@ from surgsim.teleop.operator import Operator, OperatorLaw, operate
 from surgsim.teleop.passivity_control import PassivityLaw, PortEnergy, impedance_control, observe, observed
 from surgsim.teleop.receiver import Receiver, ReceiverLaw, receive
 from surgsim.teleop.tank import Tank, TankLaw, affordable, exchange, level, send_surplus
+from surgsim.teleop.tremor_filter import TremorFilter, TremorFilterLaw, steady
 from surgsim.tick.algebra import dot
 from surgsim.tick.arrays import Array, Record
 from surgsim.tick.python_part import enter
@@ -73,6 +74,7 @@ class OperatorSideLaw(Record):
         console: The console.
         operator: The simulated operator.
         mapping: Of the mapping between console and world.
+        tremor_filter: Of what the handle tells the remote side.
         receiver: Of what comes from the remote side.
         has_video: Whether the picture has a channel of its own.
         screen: The receiver of the picture.
@@ -91,6 +93,7 @@ class OperatorSideLaw(Record):
     console: ConsoleLaw
     operator: OperatorLaw
     mapping: MappingLaw
+    tremor_filter: TremorFilterLaw
     receiver: ReceiverLaw
     has_video: int
     screen: ReceiverLaw
@@ -115,6 +118,7 @@ class OperatorSide(Record):
         content: The message, ten numbers.
         console: The console.
         mapping: Between console and world.
+        tremor_filter: Of what the handle tells the remote side.
         hand: What the hand does.
         operator: The simulated operator.
         receiver: Of what comes from the remote side.
@@ -141,6 +145,7 @@ class OperatorSide(Record):
     content: Array
     console: ConsoleMemory
     mapping: Mapping
+    tremor_filter: TremorFilter
     hand: HandAction
     operator: Operator
     receiver: Receiver
@@ -324,8 +329,10 @@ def step_operator_side(
         return status, side.end.energy_j
     energy = _settle(law, side, rendered, received)
     handle = side.console.state
-    to_remote(side.mapping, handle.position, side.content[POSITION : POSITION + 3])
-    motion_to_remote(side.mapping, handle.velocity, side.content[VELOCITY : VELOCITY + 3])
+    position, velocity = side.content[POSITION : POSITION + 3], side.content[VELOCITY : VELOCITY + 3]
+    to_remote(side.mapping, handle.position, position)
+    motion_to_remote(side.mapping, handle.velocity, velocity)
+    steady(law.tremor_filter, side.tremor_filter, side.t_s, position, velocity)
     side.content[JAW] = side.hand.jaw
     return status, energy
 
