@@ -1,10 +1,11 @@
-"""How the console was operated: the clutch, and tremor. Undefined (NaN) for a trace of another task."""
+"""How the console was operated: the clutch, tremor, and roll. Undefined (NaN) for a trace of another task."""
 
 import math
 
 import numpy as np
 from numpy.typing import NDArray
 
+from surgsim.metrics.accuracy import rms
 from surgsim.metrics.metric import CHOICE, Metric, with_block
 from surgsim.metrics.teleoperation import tip_velocity
 from surgsim.trace.trace import Trace
@@ -53,7 +54,22 @@ def tremor_transmission(trace: Trace) -> float:
     return tremor_at_tip(trace) / handle if handle > 0.0 else math.nan
 
 
+def roll_error(trace: Trace) -> float:
+    """RMS of the instrument's roll less the roll that the grip stood for, as received [rad]; NaN without."""
+    if not trace.meta.scenario["task"]["roll"]["use"]:
+        return math.nan
+    return rms(trace["roll_rad"] - trace["roll_command_rad"])
+
+
 METRICS = (
+    Metric(
+        name="roll_error_rms_deg",
+        heading="roll error, RMS [deg]",
+        matters=0.1,
+        matters_source=CHOICE,
+        meaning="RMS of the instrument's roll less the roll that the grip stood for, as received",
+        compute=with_block("roll_command", lambda trace: math.degrees(roll_error(trace))),
+    ),
     Metric(
         name="tremor_tip_rms_mm",
         heading="tremor at the tip, RMS [mm]",

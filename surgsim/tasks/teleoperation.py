@@ -30,11 +30,13 @@ from surgsim.teleop.bilateral.ends import describe_law
 from surgsim.teleop.bilateral.passive_convex import PassiveConvexConfig
 from surgsim.teleop.channel import DRAW, Channel, ChannelConfig, draw_packets
 from surgsim.teleop.console import Console, ConsoleConfig, home_room_rad
+from surgsim.teleop.goals import GOAL, Goal, goal_rows
 from surgsim.teleop.hand import Hand, fill_action
 from surgsim.teleop.mapping import MappingConfig, align, describe_mapping
 from surgsim.teleop.messages import TANK
-from surgsim.teleop.operator import GOAL, Goal, OperatorConfig, describe_operator, goal_rows
+from surgsim.teleop.operator import OperatorConfig, describe_operator
 from surgsim.teleop.receiver import ReceiverConfig, expect
+from surgsim.teleop.roll import RollConfig, describe_roll
 from surgsim.teleop.tank import fill_tank
 from surgsim.teleop.teleoperator import (
     COLUMNS,
@@ -78,6 +80,7 @@ class TeleoperationConfig(PartConfig):
         console: The master console.
         mapping: Motion scaling and rotation between console and world.
         tremor_filter: What takes tremor off what the handle tells the remote side.
+        roll: Whether the grip rolls the instrument.
         channel: The channel to the remote side, and the one back unless `channel_back` is given.
         channel_back: The channel back; null: as `channel`.
         video: The channel of the picture that the operator sees; null: it comes with the tip's state, by the
@@ -98,6 +101,7 @@ class TeleoperationConfig(PartConfig):
     console: ConsoleConfig = ConsoleConfig()
     mapping: MappingConfig = MappingConfig()
     tremor_filter: TremorFilterConfig = TremorFilterConfig()
+    roll: RollConfig = RollConfig()
     channel: ChannelConfig = ChannelConfig()
     channel_back: ChannelConfig | None = None
     video: ChannelConfig | None = None
@@ -223,6 +227,7 @@ class Teleoperation:
         for side in (near, far):
             side.period_s = self._period
             take(side.receiver, c.receiver)
+            describe_roll(side.roll, c.roll, self._period)
             describe_law(side, c.bilateral, self._scheme)
         if self._scheme:
             begin = self.gains.size - self._scheme.gains.size
@@ -343,6 +348,8 @@ class Teleoperation:
         told.t_s, told.p_WT[:] = t_s, self._start if feedback is None else feedback.p_WT
         told.v_WT[:] = 0.0 if feedback is None else feedback.v_WT
         told.f_T[:] = 0.0 if feedback is None else feedback.f_T
+        told.R_WT[:] = np.eye(3) if feedback is None else feedback.R_WT
+        told.w_WT[:] = 0.0 if feedback is None else feedback.w_WT
         self.refill(1)
         if self._hand is None:
             kernel(self.gains, told, self.memory, self._out)

@@ -1,8 +1,6 @@
 """A simulated operator: what the eyes see decides, the hand's impedance acts."""
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import ClassVar, Literal
 
 import numpy as np
@@ -12,10 +10,12 @@ from surgsim.catalog import PartConfig
 from surgsim.compiled import compiled
 from surgsim.teleop.clutch import ClutchConfig, ClutchLaw, leaves_no_room
 from surgsim.teleop.console import ConsoleState
+from surgsim.teleop.goals import CLOSED, DWELL_TIME, GOAL, PLACE, PUSH, TIMEOUT, TOLERANCE, TURNED
 from surgsim.teleop.hand import HandAction
 from surgsim.teleop.impedance import Grip, hand_wrench
 from surgsim.teleop.mapping import Mapping, motion_to_console
 from surgsim.teleop.reach import Reach, ReachConfig, ReachLaw, aim, reach_at
+from surgsim.teleop.roll import turn_grip
 from surgsim.teleop.tremor import TremorConfig, resonance, shake
 from surgsim.tick.algebra import dot
 from surgsim.tick.arrays import Array, Record
@@ -44,40 +44,10 @@ class OperatorConfig(PartConfig):
     turn_stiffness_nm_per_rad: NonNegativeFloat = 0.15
     turn_damping_nms_per_rad: NonNegativeFloat = 0.003
     jaw_time_s: PositiveFloat = 0.3
+    roll_speed_rad_per_s: PositiveFloat = 1.0
     reach: ReachConfig = ReachConfig()
     tremor: TremorConfig = TremorConfig()
     clutch: ClutchConfig = ClutchConfig()
-
-
-@dataclass(frozen=True, kw_only=True)
-class Goal:
-    """One step of the operator's program, in remote tip coordinates.
-
-    Attributes:
-        position: Where the tip shall be (3,) [m]; may lie beyond a wall.
-        tolerance_m: How near is near enough; half the target width of Fitts' law.
-        dwell_s: How long the tip is to be seen there, or the push to last.
-        jaw: Closing of the jaws during this goal, 0 open to 1 closed.
-        push: Go there once, without correcting by sight, and stay for `dwell_s`.
-        timeout_s: After this the operator gives up and takes the next goal.
-    """
-
-    position: tuple[float, float, float]
-    tolerance_m: float = 0.002
-    dwell_s: float = 0.2
-    jaw: float = 0.0
-    push: bool = False
-    timeout_s: float = math.inf
-
-
-PLACE, TOLERANCE, DWELL_TIME, CLOSED, PUSH, TIMEOUT, GOAL = 0, 3, 4, 5, 6, 7, 8
-"""Where in a goal's row its numbers are, and its length."""
-
-
-def goal_rows(goals: Sequence[Goal]) -> Array:
-    """The goals as rows (k, 8)."""
-    rows = [(*g.position, g.tolerance_m, g.dwell_s, g.jaw, float(g.push), g.timeout_s) for g in goals]
-    return np.array(rows).reshape(-1, GOAL)
 
 
 MOVE, WATCH, DWELL, DONE, INDEX = range(5)
@@ -95,6 +65,7 @@ class OperatorLaw(Record):
         period_s: Control period [s].
         blur: How much of a new picture is taken in over a period.
         jaw_step: Most that the jaws close in a period.
+        roll_step: Most that the hand turns the grip in a period [rad].
         shake_last: a_1 of the tremor.
         shake_before: a_2 of the tremor.
         grip: The hand's impedance.
@@ -112,6 +83,7 @@ class OperatorLaw(Record):
     period_s: float
     blur: float
     jaw_step: float
+    roll_step: float
     shake_last: float
     shake_before: float
     grip: Grip
@@ -136,6 +108,7 @@ class Operator(Record):
         goal_start_s: When the goal was begun [s].
         leave_s: When it may be left [s].
         jaw: How far the jaws close.
+        roll: How far the hand has turned the grip about its axis [rad].
         reach: The movement.
         seen: The tip as it is taken in (3,) [m].
         speed: Its velocity (3,) [m/s].
@@ -160,6 +133,7 @@ class Operator(Record):
     goal_start_s: float
     leave_s: float
     jaw: float
+    roll: float
     reach: Reach
     seen: Array
     speed: Array
@@ -190,6 +164,7 @@ def describe_operator(
     take(law.clutch, config.clutch)
     law.clutch.use = config.clutch.use
     law.period_s, law.jaw_step = period_s, period_s / config.jaw_time_s
+    law.roll_step = period_s * config.roll_speed_rad_per_s
     law.blur = 1.0 - math.exp(-period_s / config.gaze_time_s)
     law.shake_last, law.shake_before, noise = resonance(config.tremor, period_s)
     return noise
@@ -234,7 +209,10 @@ def operate(
     for i in range(3):
         position[i] = out.intended[i] + shaken[i]
         velocity[i] += (shaken[i] - before[i]) / law.period_s
-    hand_wrench(law.grip, position, velocity, operator.upright, handle, out.wrench)
+    _turn(law, gains, operator)
+    turned = np.empty((3, 3))
+    turn_grip(operator.upright, operator.roll, turned)
+    hand_wrench(law.grip, position, velocity, turned, handle, out.wrench)
     out.jaw, out.goal, out.missed = operator.jaw, operator.index, operator.missed
     out.done, out.clutch = 1 if operator.phase == DONE else 0, operator.pedal
 
@@ -373,7 +351,7 @@ def _decide(
             operator.phase, operator.leave_s = DWELL, t_s + goal[DWELL_TIME]
         else:
             _move(law, gains, operator, memory, t_s, mapping)
-    elif t_s >= operator.leave_s:
+    elif t_s >= operator.leave_s and operator.roll == goal[TURNED]:
         _begin(law, gains, operator, memory, operator.index + 1, t_s, mapping)
     elif goal[PUSH] == 0.0 and _distance(operator) > goal[TOLERANCE]:
         _move(law, gains, operator, memory, t_s, mapping)
@@ -396,3 +374,14 @@ def _close_jaw(law: OperatorLaw, gains: Array, operator: Operator) -> None:
     if law.goal_count > 0:
         wanted = _goal(law, gains, min(operator.index, law.goal_count - 1))[CLOSED]
     operator.jaw += min(max(wanted - operator.jaw, -law.jaw_step), law.jaw_step)
+
+
+@compiled
+def _turn(law: OperatorLaw, gains: Array, operator: Operator) -> None:
+    """Turn the grip as the goal, or the last one, wants it."""
+    if law.goal_count > 0:
+        left = _goal(law, gains, min(operator.index, law.goal_count - 1))[TURNED] - operator.roll
+        if abs(left) <= law.roll_step:
+            operator.roll = _goal(law, gains, min(operator.index, law.goal_count - 1))[TURNED]
+        else:
+            operator.roll += law.roll_step if left > 0.0 else -law.roll_step

@@ -19,10 +19,11 @@ from surgsim.teleop.mapping import (
     remap,
     to_remote,
 )
-from surgsim.teleop.messages import CONTENT, JAW, OFF, POSITION, SCHEME, TDPA, VELOCITY
+from surgsim.teleop.messages import CONTENT, JAW, OFF, POSITION, ROLL, ROLL_RATE, SCHEME, TDPA, VELOCITY
 from surgsim.teleop.operator import Operator, OperatorLaw, operate
 from surgsim.teleop.passivity_control import PassivityLaw, PortEnergy, impedance_control, observe, observed
 from surgsim.teleop.receiver import Receiver, ReceiverLaw, receive
+from surgsim.teleop.roll import RollLaw, rate_about
 from surgsim.teleop.tank import Tank, TankLaw, affordable, exchange, level, send_surplus
 from surgsim.teleop.tremor_filter import TremorFilter, TremorFilterLaw, steady
 from surgsim.tick.algebra import dot
@@ -75,6 +76,7 @@ class OperatorSideLaw(Record):
         operator: The simulated operator.
         mapping: Of the mapping between console and world.
         tremor_filter: Of what the handle tells the remote side.
+        roll: Of the instrument's roll.
         receiver: Of what comes from the remote side.
         has_video: Whether the picture has a channel of its own.
         screen: The receiver of the picture.
@@ -94,6 +96,7 @@ class OperatorSideLaw(Record):
     operator: OperatorLaw
     mapping: MappingLaw
     tremor_filter: TremorFilterLaw
+    roll: RollLaw
     receiver: ReceiverLaw
     has_video: int
     screen: ReceiverLaw
@@ -110,12 +113,13 @@ class OperatorSide(Record):
         of_scheme: Whether the energy is the bilateral scheme's.
         t_s: Time [s].
         scale: Share of the force that the tank can pay for.
+        roll: The instrument's roll that the grip stands for [rad].
         tip: The tip as it is known (3,) [m].
         seen: The tip as the screen shows it (3,) [m].
         wrench: What the motors are to render, force and zeros (6,) [N, N m].
         desired: Force before the tank or the passivity controller (3,) [N].
         path: Motion of the handle over the period (3,) [m].
-        content: The message, ten numbers.
+        content: The message, twelve numbers.
         console: The console.
         mapping: Between console and world.
         tremor_filter: Of what the handle tells the remote side.
@@ -137,6 +141,7 @@ class OperatorSide(Record):
     of_scheme: int
     t_s: float
     scale: float
+    roll: float
     tip: Array
     seen: Array
     wrench: Array
@@ -276,6 +281,17 @@ def _settle(law: OperatorSideLaw, side: OperatorSide, rendered_j: float, receive
 
 
 @compiled
+def _tell_grip(law: OperatorSideLaw, side: OperatorSide) -> None:
+    """Jaw and roll in the message; the roll adds up what the clutch passes on of the grip's turn."""
+    handle, content = side.console.state, side.content
+    rate = 0.0
+    if law.roll.use:
+        rate = side.mapping.engaged * rate_about(handle.rotation, 0, handle.angular_velocity)
+    side.roll += law.period_s * rate
+    content[JAW], content[ROLL], content[ROLL_RATE] = side.hand.jaw, side.roll, rate
+
+
+@compiled
 def step_operator_side(
     law: OperatorSideLaw,
     gains: Array,
@@ -325,7 +341,7 @@ def step_operator_side(
     rendered = _move_console(law, side)
     if law.passivity == SCHEME:
         status = _tell(law, gains, side, memory, rendered)
-        side.content[JAW] = side.hand.jaw
+        _tell_grip(law, side)
         return status, side.end.energy_j
     energy = _settle(law, side, rendered, received)
     handle = side.console.state
@@ -333,7 +349,7 @@ def step_operator_side(
     to_remote(side.mapping, handle.position, position)
     motion_to_remote(side.mapping, handle.velocity, velocity)
     steady(law.tremor_filter, side.tremor_filter, side.t_s, position, velocity)
-    side.content[JAW] = side.hand.jaw
+    _tell_grip(law, side)
     return status, energy
 
 

@@ -30,6 +30,7 @@ from surgsim.teleop.remote_side import (
     RemoteSide,
     RemoteSideLaw,
     fill_remote_columns,
+    lead_roll,
     step_remote_side,
 )
 from surgsim.teleop.tip_work import TipWork, add_tip_work
@@ -87,7 +88,7 @@ class State(Record):
         is_done: Whether the operator is done.
         done_s: Since when [s].
         velocity: v_d of the last period (3,) [m/s].
-        content: The message of the remote side, ten numbers.
+        content: The message of the remote side, twelve numbers.
         operator: The operator's side.
         remote: The remote side.
         forth: The channel to the remote side.
@@ -197,6 +198,7 @@ def teleoperate(gains: Array, feedback: Feedback, memory: Array, out: Command) -
     )
     if status != GOES_ON:
         return status
+    lead_roll(law.remote, remote, feedback.R_WT, feedback.w_WT)
     if law.remote.passivity == SCHEME:
         state.content[:] = remote.end.content
     send(law.back, state.back, memory, t_s, state.content, energy)
@@ -222,7 +224,7 @@ def _tell(law: Law, state: State, feedback: Feedback, out: Command) -> None:
         out.a_WTd[i] = (remote.velocity[i] - state.velocity[i]) / law.remote.period_s
         state.velocity[i] = remote.velocity[i]
         out.budget_f_T[i] = feedback.f_T[i] if limited else 0.0
-    out.jaw, out.budget_j = remote.jaw, remote.budget_j
+    out.jaw, out.budget_j, out.roll_rate = remote.jaw, remote.budget_j, remote.roll_rate
 
 
 @compiled

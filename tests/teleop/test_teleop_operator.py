@@ -7,15 +7,14 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from surgsim.teleop.console import ConsoleConfig, new_console, step_console
+from surgsim.teleop.goals import Goal, goal_rows
 from surgsim.teleop.hand import HandAction
 from surgsim.teleop.mapping import Mapping, MappingConfig, align, to_remote
 from surgsim.teleop.operator import (
-    Goal,
     Operator,
     OperatorConfig,
     OperatorLaw,
     describe_operator,
-    goal_rows,
     operate,
 )
 from surgsim.teleop.reach import Reach, ReachConfig, ReachLaw, aim, movement_time, reach_at, scatter
