@@ -9,6 +9,7 @@ from surgsim.metrics import (
     dexterity,
     effort,
     force,
+    operating,
     optimality,
     peg_and_ring,
     roughness,
@@ -34,6 +35,7 @@ _SHIPPED: tuple[tuple[Metric, ...], ...] = tuple(
         stopping,
         peg_and_ring,
         teleoperation,
+        operating,
         timing,
     )
 )

@@ -29,11 +29,14 @@ from surgsim.teleop.bilateral.base import BilateralConfig
 from surgsim.teleop.bilateral.ends import describe_law
 from surgsim.teleop.bilateral.passive_convex import PassiveConvexConfig
 from surgsim.teleop.channel import DRAW, Channel, ChannelConfig, draw_packets
-from surgsim.teleop.console import Console, ConsoleConfig
-from surgsim.teleop.mapping import MappingConfig, align
+from surgsim.teleop.console import Console, ConsoleConfig, home_room_rad
+from surgsim.teleop.goals import GOAL, Goal, goal_rows
+from surgsim.teleop.hand import Hand, fill_action
+from surgsim.teleop.mapping import MappingConfig, align, describe_mapping
 from surgsim.teleop.messages import TANK
-from surgsim.teleop.operator import Goal, Hand, OperatorConfig, describe_operator, fill_action, goal_rows
+from surgsim.teleop.operator import OperatorConfig, describe_operator
 from surgsim.teleop.receiver import ReceiverConfig, expect
+from surgsim.teleop.roll import RollConfig, describe_roll
 from surgsim.teleop.tank import fill_tank
 from surgsim.teleop.teleoperator import (
     COLUMNS,
@@ -45,6 +48,7 @@ from surgsim.teleop.teleoperator import (
     places,
     teleoperate,
 )
+from surgsim.teleop.tremor_filter import TremorFilterConfig, describe_filter
 from surgsim.tick.arrays import Command, task_signature
 from surgsim.tick.blank import new_command, new_feedback
 from surgsim.tick.overlay import laid_over, take
@@ -75,6 +79,8 @@ class TeleoperationConfig(PartConfig):
         operator: Eyes, decisions and hand.
         console: The master console.
         mapping: Motion scaling and rotation between console and world.
+        tremor_filter: What takes tremor off what the handle tells the remote side.
+        roll: Whether the grip rolls the instrument.
         channel: The channel to the remote side, and the one back unless `channel_back` is given.
         channel_back: The channel back; null: as `channel`.
         video: The channel of the picture that the operator sees; null: it comes with the tip's state, by the
@@ -94,6 +100,8 @@ class TeleoperationConfig(PartConfig):
     operator: OperatorConfig = OperatorConfig()
     console: ConsoleConfig = ConsoleConfig()
     mapping: MappingConfig = MappingConfig()
+    tremor_filter: TremorFilterConfig = TremorFilterConfig()
+    roll: RollConfig = RollConfig()
     channel: ChannelConfig = ChannelConfig()
     channel_back: ChannelConfig | None = None
     video: ChannelConfig | None = None
@@ -105,13 +113,30 @@ class TeleoperationConfig(PartConfig):
             raise ValueError("program 'peg_and_ring' makes its own goals: leave goals out")
         return self
 
+    @model_validator(mode="after")
+    def _filter_fits_the_scheme(self) -> Self:
+        if self.tremor_filter.type != "none" and self.bilateral.type != "passive_convex":
+            raise ValueError(
+                "a tremor_filter needs the bilateral scheme 'passive_convex', whose tanks book the work at "
+                f"the handle: '{self.bilateral.type}' takes what the handle tells for the motion of its port"
+            )
+        return self
+
     def check(self, scenario: Surroundings) -> None:
         """Refuse what does not fit the rest of the scenario.
 
         Raises:
-            ValueError: If the console's steps do not fit the control period, or the board is not in `props`.
+            ValueError: If the console's steps do not fit the control period, the tremor filter does not fit
+                it, the console has no room for the clutch's margin, or the board is not in `props`.
         """
         self.console.substeps(scenario.control_period_s)
+        self.tremor_filter.sampled(scenario.control_period_s)
+        margin, room = self.operator.clutch.stop_margin_rad, home_room_rad()
+        if margin >= room:
+            raise ValueError(
+                f"operator.clutch.stop_margin_rad {margin:g} must be below {room:.3g}, "
+                "the way from the console's home pose to its nearest stop"
+            )
         if self.program != "peg_and_ring":
             return
         boards = [prop for prop in scenario.props if isinstance(prop, PegBoardLayout)]
@@ -146,7 +171,7 @@ class Teleoperation:
 
     Attributes:
         kernel: status = kernel(gains, feedback, memory, out).
-        gains: Its numbers: a `Law`, then the goals' rows.
+        gains: Its numbers: a `Law`, then the rows of the goals and of the mapping's changes, then a scheme's.
         memory: Its memory: a `State`, then the tables of `places`.
     """
 
@@ -171,7 +196,8 @@ class Teleoperation:
         packets = [(life, copies(channel)) for life, channel in zip(lives, self._channels, strict=True)]
         self._places = places(packets, ends)
         own = self._scheme.gains if self._scheme else np.zeros(0)
-        self.gains = np.concatenate([np.zeros(LAW_SIZE), goal_rows(self._goals).ravel(), own])
+        rows = (goal_rows(self._goals).ravel(), config.mapping.change_rows().ravel())
+        self.gains = np.concatenate([np.zeros(LAW_SIZE), *rows, own])
         self.memory = np.zeros(self._places.end)
         self._describe(lives)
         self.reset()
@@ -194,13 +220,14 @@ class Teleoperation:
         laid_over(Law, self.gains).force_share = time_s / self._period
 
     def _describe(self, lives: Sequence[int]) -> None:
-        """Fill the numbers; those of the mapping and of the hand come with `reset`."""
+        """Fill the numbers; the mapping and what is of the hand come with `reset`."""
         c, law, at = self._c, laid_over(Law, self.gains), self._places
         near, far = law.operator, law.remote
         law.hold_end_s, law.start[:], law.force_share = c.hold_end_s, self._start, 1.0
         for side in (near, far):
             side.period_s = self._period
             take(side.receiver, c.receiver)
+            describe_roll(side.roll, c.roll, self._period)
             describe_law(side, c.bilateral, self._scheme)
         if self._scheme:
             begin = self.gains.size - self._scheme.gains.size
@@ -214,6 +241,10 @@ class Teleoperation:
         self._noise_m = describe_operator(near.operator, c.operator, self._period, round_trip)
         near.operator.goals, near.operator.goal_count = LAW_SIZE, len(self._goals)
         near.operator.tremor, near.operator.scatter = at.tremor, at.scatter
+        describe_mapping(near.mapping, c.mapping, self._period)
+        describe_filter(near.tremor_filter, c.tremor_filter, self._period)
+        near.mapping.changes = LAW_SIZE + GOAL * len(self._goals)
+        near.operator.clutch.fade_s = c.mapping.clutch_fade_s
         lines = (
             (law.forth, far.receiver, at.forth_draws, at.forth_ring, at.forth_taken),
             (law.back, near.receiver, at.back_draws, at.back_ring, at.back_taken),
@@ -237,7 +268,7 @@ class Teleoperation:
         state, memory = laid_over(State, self.memory), self.memory
         near, far = state.operator, state.remote
         self._console.reset(law.operator.console, near.console)
-        align(law.operator.operator.mapping, c.mapping, near.console.state.position, self._start)
+        align(near.mapping, c.mapping, near.console.state.position, self._start)
         state.ends = bool(self._goals) or self._hand is not None
         near.in_python = self._hand is not None
         near.of_scheme = far.of_scheme = self._scheme is not None
@@ -317,6 +348,8 @@ class Teleoperation:
         told.t_s, told.p_WT[:] = t_s, self._start if feedback is None else feedback.p_WT
         told.v_WT[:] = 0.0 if feedback is None else feedback.v_WT
         told.f_T[:] = 0.0 if feedback is None else feedback.f_T
+        told.R_WT[:] = np.eye(3) if feedback is None else feedback.R_WT
+        told.w_WT[:] = 0.0 if feedback is None else feedback.w_WT
         self.refill(1)
         if self._hand is None:
             kernel(self.gains, told, self.memory, self._out)

@@ -10,8 +10,8 @@ from surgsim.catalog import PartConfig
 from surgsim.models.config import Vec3
 from surgsim.models.peg_board import PegBoardLayout, transfer_goals
 from surgsim.tasks.success import RunColumns, Success
+from surgsim.teleop.goals import Goal
 from surgsim.teleop.judgement import faults, stuck
-from surgsim.teleop.operator import Goal
 
 Array = NDArray[np.float64]
 _STEP_M = 0.005
@@ -30,6 +30,7 @@ class GoalConfig(PartConfig):
         jaw: How far the jaws close during this goal, from 0 (open) to 1.
         push: Go there once, without correcting by sight, and stay for `dwell_s`.
         timeout_s: After this the operator gives up and takes the next goal; null: never [s].
+        roll_deg: Turn of the grip from the start, which `roll` passes on to the instrument [deg].
     """
 
     position_m: Vec3
@@ -38,6 +39,7 @@ class GoalConfig(PartConfig):
     jaw: float = Field(default=0.0, ge=0.0, le=1.0)
     push: bool = False
     timeout_s: PositiveFloat | None = None
+    roll_deg: float = Field(default=0.0, ge=-120.0, le=120.0)
 
     def goal(self) -> Goal:
         """The operator's goal."""
@@ -48,6 +50,7 @@ class GoalConfig(PartConfig):
             jaw=self.jaw,
             push=self.push,
             timeout_s=math.inf if self.timeout_s is None else self.timeout_s,
+            roll=math.radians(self.roll_deg),
         )
 
 

@@ -1,5 +1,6 @@
 """The master console: a force-controlled haptic arm in its own MuJoCo model, with its energy account."""
 
+import math
 from typing import ClassVar
 
 import mujoco
@@ -58,6 +59,7 @@ class ConsoleState(Record):
         velocity: Handle velocity (3,) [m/s].
         angular_velocity: Handle angular velocity in O (3,) [rad/s].
         stop: Number of the joint on its stop, the first of `JOINTS` is 1; 0 if none is.
+        room_rad: Way that is left to the nearest stop of a joint [rad].
     """
 
     SHAPES: ClassVar[dict[str, str]] = {
@@ -76,6 +78,7 @@ class ConsoleState(Record):
     velocity: Array
     angular_velocity: Array
     stop: int
+    room_rad: float
 
 
 class ConsoleEnergy(Record):
@@ -190,11 +193,12 @@ def measure_console(law: ConsoleLaw, console: ConsoleMemory) -> None:
     mj_jacSite(law.mj_model, law.mj_data, J.ctypes.data, J.ctypes.data + 8 * 3 * _N, law.site)
     place, turn = vector(law.site_xpos, 3), vector(law.site_xmat, 9)
     qpos, qvel, energy = vector(law.qpos, _N), vector(law.qvel, _N), vector(law.energy, 2)
-    state.stop = 0
+    state.stop, state.room_rad = 0, math.inf
     for i in range(_N):
         state.q[i], state.v[i] = qpos[i], qvel[i]
         if not law.q_min[i] + AT_STOP_RAD < qpos[i] < law.q_max[i] - AT_STOP_RAD:
             state.stop = i + 1
+        state.room_rad = min(state.room_rad, qpos[i] - law.q_min[i], law.q_max[i] - qpos[i])
     times(J[:3], qvel, state.velocity)
     times(J[3:], qvel, state.angular_velocity)
     for i in range(3):
@@ -313,6 +317,13 @@ class Console:
         mujoco.mj_step1(self.model, self.data)
         memory.potential_j = self.data.energy[0]
         measure_console(law, memory)
+
+
+def home_room_rad() -> float:
+    """Way from the home pose to the nearest stop of a joint [rad]."""
+    model = load_console()
+    home = model.key("home").qpos
+    return float(min((home - model.jnt_range[:, 0]).min(), (model.jnt_range[:, 1] - home).min()))
 
 
 def new_console(config: ConsoleConfig, period_s: float = 0.001) -> tuple[Console, ConsoleLaw, ConsoleMemory]:

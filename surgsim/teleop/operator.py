@@ -1,19 +1,21 @@
 """A simulated operator: what the eyes see decides, the hand's impedance acts."""
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass, field
-from typing import ClassVar, Literal, Protocol
+from typing import ClassVar, Literal
 
 import numpy as np
 from pydantic import NonNegativeFloat, PositiveFloat
 
 from surgsim.catalog import PartConfig
 from surgsim.compiled import compiled
+from surgsim.teleop.clutch import ClutchConfig, ClutchLaw, leaves_no_room
 from surgsim.teleop.console import ConsoleState
+from surgsim.teleop.goals import CLOSED, DWELL_TIME, GOAL, PLACE, PUSH, TIMEOUT, TOLERANCE, TURNED
+from surgsim.teleop.hand import HandAction
 from surgsim.teleop.impedance import Grip, hand_wrench
 from surgsim.teleop.mapping import Mapping, motion_to_console
 from surgsim.teleop.reach import Reach, ReachConfig, ReachLaw, aim, reach_at
+from surgsim.teleop.roll import turn_grip
 from surgsim.teleop.tremor import TremorConfig, resonance, shake
 from surgsim.tick.algebra import dot
 from surgsim.tick.arrays import Array, Record
@@ -30,7 +32,7 @@ class OperatorConfig(PartConfig):
     a movement it waits `expected_delay_s`, the round trip it is used to (`auto`: that of the channels), then
     for the tip on the screen to rest, and only then corrects. Every decision takes `reaction_s`. A goal at
     the place of the one before is for the jaws alone: the hand stays, and waits until it must have seen them
-    act.
+    act. With a `clutch` it re-indexes the handle where that nears its stop.
     """
 
     reaction_s: NonNegativeFloat = 0.2
@@ -42,96 +44,15 @@ class OperatorConfig(PartConfig):
     turn_stiffness_nm_per_rad: NonNegativeFloat = 0.15
     turn_damping_nms_per_rad: NonNegativeFloat = 0.003
     jaw_time_s: PositiveFloat = 0.3
+    roll_speed_rad_per_s: PositiveFloat = 1.0
     reach: ReachConfig = ReachConfig()
     tremor: TremorConfig = TremorConfig()
+    clutch: ClutchConfig = ClutchConfig()
 
 
-@dataclass(frozen=True, kw_only=True)
-class Goal:
-    """One step of the operator's program, in remote tip coordinates.
-
-    Attributes:
-        position: Where the tip shall be (3,) [m]; may lie beyond a wall.
-        tolerance_m: How near is near enough; half the target width of Fitts' law.
-        dwell_s: How long the tip is to be seen there, or the push to last.
-        jaw: Closing of the jaws during this goal, 0 open to 1 closed.
-        push: Go there once, without correcting by sight, and stay for `dwell_s`.
-        timeout_s: After this the operator gives up and takes the next goal.
-    """
-
-    position: tuple[float, float, float]
-    tolerance_m: float = 0.002
-    dwell_s: float = 0.2
-    jaw: float = 0.0
-    push: bool = False
-    timeout_s: float = math.inf
-
-
-PLACE, TOLERANCE, DWELL_TIME, CLOSED, PUSH, TIMEOUT, GOAL = 0, 3, 4, 5, 6, 7, 8
-"""Where in a goal's row its numbers are, and its length."""
-
-
-def goal_rows(goals: Sequence[Goal]) -> Array:
-    """The goals as rows (k, 8)."""
-    rows = [(*g.position, g.tolerance_m, g.dwell_s, g.jaw, float(g.push), g.timeout_s) for g in goals]
-    return np.array(rows).reshape(-1, GOAL)
-
-
-@dataclass(frozen=True, kw_only=True, slots=True)
-class HandCommand:
-    """What a hand in Python does in one period.
-
-    Attributes:
-        wrench: Force and torque on the handle in O (6,) [N, N m].
-        jaw: Closing of the pinch grip, 0 to 1.
-        goal: Index of the goal; the number of goals once done.
-        done: No goal is left.
-        missed: Goals given up so far.
-        intended: Where the hand is meant to be, in O (3,) [m], without tremor; NaN if it does not say.
-    """
-
-    wrench: Array
-    jaw: float
-    goal: int
-    done: bool
-    missed: int
-    intended: Array = field(default_factory=lambda: np.full(3, np.nan))
-
-
-class Hand(Protocol):
-    """Whoever holds the handle in the simulated operator's place: a person, or an outside class."""
-
-    def step(self, t_s: float, seen_tip: Array, handle: ConsoleState) -> HandCommand:
-        """What the hand does in the period from `t_s`.
-
-        Args:
-            t_s: Time [s].
-            seen_tip: Remote tip as the screen shows it, already delayed (3,) [m].
-            handle: What the console measures, a copy of its `ConsoleState`.
-        """
-        ...
-
-
-class HandAction(Record):
-    """What the hand does in one period; as `HandCommand`."""
-
-    SHAPES: ClassVar[dict[str, str]] = {"wrench": "6", "intended": "3"}
-    wrench: Array
-    jaw: float
-    goal: int
-    done: int
-    missed: int
-    intended: Array
-
-
-def fill_action(action: HandAction, command: HandCommand) -> None:
-    """Write what a hand in Python does."""
-    action.wrench[:], action.jaw, action.goal = command.wrench, command.jaw, command.goal
-    action.done, action.missed, action.intended[:] = command.done, command.missed, command.intended
-
-
-MOVE, WATCH, DWELL, DONE = range(4)
-"""Phases: moving the hand, waiting for the picture to rest, staying at the goal, no goal is left."""
+MOVE, WATCH, DWELL, DONE, INDEX = range(5)
+"""Phases: moving the hand, waiting for the picture to rest, staying at the goal, done, re-indexing."""
+_HOME_WIDTH_M = 0.01  # so near is near enough when the hand goes back to where the handle has room
 
 
 class OperatorLaw(Record):
@@ -144,11 +65,12 @@ class OperatorLaw(Record):
         period_s: Control period [s].
         blur: How much of a new picture is taken in over a period.
         jaw_step: Most that the jaws close in a period.
+        roll_step: Most that the hand turns the grip in a period [rad].
         shake_last: a_1 of the tremor.
         shake_before: a_2 of the tremor.
         grip: The hand's impedance.
         reach: How it reaches.
-        mapping: How it moves the handle to move the tip.
+        clutch: When it re-indexes.
         goals: Where the goals' rows begin in the gains.
         goal_count: How many there are.
         tremor: Where the tremor's noise begins in the memory, a row (3,) [m] for each period.
@@ -161,11 +83,12 @@ class OperatorLaw(Record):
     period_s: float
     blur: float
     jaw_step: float
+    roll_step: float
     shake_last: float
     shake_before: float
     grip: Grip
     reach: ReachLaw
-    mapping: Mapping
+    clutch: ClutchLaw
     goals: int
     goal_count: int
     tremor: int
@@ -185,17 +108,20 @@ class Operator(Record):
         goal_start_s: When the goal was begun [s].
         leave_s: When it may be left [s].
         jaw: How far the jaws close.
+        roll: How far the hand has turned the grip about its axis [rad].
         reach: The movement.
         seen: The tip as it is taken in (3,) [m].
         speed: Its velocity (3,) [m/s].
         target: Where the tip shall be (3,) [m]; NaN before the first goal.
         upright: Orientation that the hand keeps (3, 3).
+        home: Where the handle was at first (3,) [m].
+        pedal: Whether it presses the clutch's pedal.
         shake: Displacement by tremor (3,) [m].
         shake_before: The one before it (3,) [m].
     """
 
     SHAPES: ClassVar[dict[str, str]] = {
-        **{name: "3" for name in ("seen", "speed", "target", "shake", "shake_before")},
+        **{name: "3" for name in ("seen", "speed", "target", "shake", "shake_before", "home")},
         "upright": "3 3",
     }
     begun: int
@@ -207,6 +133,7 @@ class Operator(Record):
     goal_start_s: float
     leave_s: float
     jaw: float
+    roll: float
     reach: Reach
     seen: Array
     speed: Array
@@ -214,12 +141,14 @@ class Operator(Record):
     upright: Array
     shake: Array
     shake_before: Array
+    home: Array
+    pedal: int
 
 
 def describe_operator(
     law: OperatorLaw, config: OperatorConfig, period_s: float, round_trip_s: float = 0.0
 ) -> float:
-    """Fill all numbers but mapping and places; answers the standard deviation of the tremor's noise [m].
+    """Fill all numbers but places; answers the standard deviation of the tremor's noise [m].
 
     Args:
         law: Filled.
@@ -232,7 +161,10 @@ def describe_operator(
     take(law, config)
     take(law.grip, config)
     take(law.reach, config.reach)
+    take(law.clutch, config.clutch)
+    law.clutch.use = config.clutch.use
     law.period_s, law.jaw_step = period_s, period_s / config.jaw_time_s
+    law.roll_step = period_s * config.roll_speed_rad_per_s
     law.blur = 1.0 - math.exp(-period_s / config.gaze_time_s)
     law.shake_last, law.shake_before, noise = resonance(config.tremor, period_s)
     return noise
@@ -247,6 +179,7 @@ def operate(
     t_s: float,
     tip: Array,
     handle: ConsoleState,
+    mapping: Mapping,
     out: HandAction,
 ) -> None:
     """Look, decide, act: one period of a program of goals.
@@ -261,10 +194,11 @@ def operate(
         t_s: Time [s].
         tip: Remote tip as the screen shows it, already delayed (3,) [m].
         handle: The console.
+        mapping: What the tip does when the handle moves.
         out: Filled with what the hand does.
     """
-    _look(law, gains, operator, memory, t_s, tip, handle)
-    _decide(law, gains, operator, memory, t_s)
+    _look(law, gains, operator, memory, t_s, tip, handle, mapping)
+    _decide(law, gains, operator, memory, t_s, handle, mapping)
     position, velocity = np.empty(3), np.empty(3)
     reach_at(operator.reach, t_s, out.intended, velocity)
     _close_jaw(law, gains, operator)
@@ -275,9 +209,12 @@ def operate(
     for i in range(3):
         position[i] = out.intended[i] + shaken[i]
         velocity[i] += (shaken[i] - before[i]) / law.period_s
-    hand_wrench(law.grip, position, velocity, operator.upright, handle, out.wrench)
+    _turn(law, gains, operator)
+    turned = np.empty((3, 3))
+    turn_grip(operator.upright, operator.roll, turned)
+    hand_wrench(law.grip, position, velocity, turned, handle, out.wrench)
     out.jaw, out.goal, out.missed = operator.jaw, operator.index, operator.missed
-    out.done = 1 if operator.phase == DONE else 0
+    out.done, out.clutch = 1 if operator.phase == DONE else 0, operator.pedal
 
 
 @compiled
@@ -296,6 +233,7 @@ def _look(
     t_s: float,
     tip: Array,
     handle: ConsoleState,
+    mapping: Mapping,
 ) -> None:
     """Take the picture in through a low-pass; at first, begin the program."""
     if operator.begun:
@@ -308,16 +246,25 @@ def _look(
     operator.reach.start_s, operator.reach.duration_s = t_s - 1.0, 1.0
     for i in range(3):
         operator.seen[i], operator.reach.origin[i], operator.target[i] = tip[i], handle.position[i], math.nan
+        operator.home[i] = handle.position[i]
         for k in range(3):
             operator.upright[i, k] = handle.rotation[i, k]
     if law.goal_count > 0:
-        _begin(law, gains, operator, memory, 0, t_s)
+        _begin(law, gains, operator, memory, 0, t_s, mapping)
 
 
 @compiled
-def _begin(law: OperatorLaw, gains: Array, operator: Operator, memory: Array, index: int, t_s: float) -> None:
+def _begin(
+    law: OperatorLaw,
+    gains: Array,
+    operator: Operator,
+    memory: Array,
+    index: int,
+    t_s: float,
+    mapping: Mapping,
+) -> None:
     """Take a goal up."""
-    operator.index, operator.goal_start_s = index, t_s
+    operator.index, operator.goal_start_s, operator.pedal = index, t_s, 0
     if index == law.goal_count:
         operator.phase = DONE
         return
@@ -328,28 +275,57 @@ def _begin(law: OperatorLaw, gains: Array, operator: Operator, memory: Array, in
     if stays and _distance(operator) <= goal[TOLERANCE]:
         operator.phase, operator.leave_s = DWELL, t_s + law.expected_delay_s + goal[DWELL_TIME]
         return
-    _move(law, gains, operator, memory, t_s)
+    _move(law, gains, operator, memory, t_s, mapping)
 
 
 @compiled
-def _move(law: OperatorLaw, gains: Array, operator: Operator, memory: Array, t_s: float) -> None:
+def _move(
+    law: OperatorLaw, gains: Array, operator: Operator, memory: Array, t_s: float, mapping: Mapping
+) -> None:
     """Aim the hand so that the tip, seen where it is, would reach the goal; begin after the reaction."""
     origin, change, reach = np.empty(3), np.empty(3), operator.reach
     reach_at(reach, t_s, origin, change)
     for i in range(3):
         reach.origin[i], origin[i] = origin[i], operator.target[i] - operator.seen[i]
-    motion_to_console(law.mapping, origin, change)
+    motion_to_console(mapping, origin, change)
     for i in range(3):
         change[i] += reach.origin[i]
-    width = 2.0 * _goal(law, gains, operator.index)[TOLERANCE] / law.mapping.scale
-    noise = law.scatter + 3 * operator.scattered
-    operator.scattered += 1
-    aim(law.reach, reach, change, width, t_s + law.reaction_s, memory[noise : noise + 3])
+    width = 2.0 * _goal(law, gains, operator.index)[TOLERANCE] / mapping.scale
+    aim(law.reach, reach, change, width, t_s + law.reaction_s, _scatter(law, operator, memory))
     operator.phase = MOVE
 
 
 @compiled
-def _decide(law: OperatorLaw, gains: Array, operator: Operator, memory: Array, t_s: float) -> None:
+def _scatter(law: OperatorLaw, operator: Operator, memory: Array) -> Array:
+    """The next row of the scatter (3,)."""
+    noise = law.scatter + 3 * operator.scattered
+    operator.scattered += 1
+    return memory[noise : noise + 3]
+
+
+@compiled
+def _index(law: OperatorLaw, operator: Operator, memory: Array, t_s: float) -> None:
+    """Press the pedal, and go back with the handle to where it was at first."""
+    change, reach = np.empty(3), operator.reach
+    origin = np.empty(3)
+    reach_at(reach, t_s, origin, change)
+    for i in range(3):
+        reach.origin[i] = origin[i]
+    start_s = t_s + law.clutch.fade_s
+    aim(law.reach, reach, operator.home, _HOME_WIDTH_M, start_s, _scatter(law, operator, memory))
+    operator.phase, operator.pedal = INDEX, 1
+
+
+@compiled
+def _decide(
+    law: OperatorLaw,
+    gains: Array,
+    operator: Operator,
+    memory: Array,
+    t_s: float,
+    handle: ConsoleState,
+    mapping: Mapping,
+) -> None:
     """Give a goal up, go on to the next phase, or correct."""
     if operator.phase == DONE:
         return
@@ -357,9 +333,14 @@ def _decide(law: OperatorLaw, gains: Array, operator: Operator, memory: Array, t
     end_s = reach.start_s + reach.duration_s
     if t_s - operator.goal_start_s > goal[TIMEOUT]:
         operator.missed += 1
-        _begin(law, gains, operator, memory, operator.index + 1, t_s)
-    elif operator.phase == MOVE:
+        _begin(law, gains, operator, memory, operator.index + 1, t_s, mapping)
+    elif operator.phase == INDEX:
         if t_s >= end_s:
+            operator.phase, operator.pedal = WATCH, 0
+    elif operator.phase == MOVE:
+        if leaves_no_room(law.clutch, reach, operator.home, handle):
+            _index(law, operator, memory, t_s)
+        elif t_s >= end_s:
             operator.phase = DWELL if goal[PUSH] == 1.0 else WATCH
             operator.leave_s = t_s + goal[DWELL_TIME]
     elif operator.phase == WATCH:
@@ -369,11 +350,11 @@ def _decide(law: OperatorLaw, gains: Array, operator: Operator, memory: Array, t
         if _distance(operator) <= goal[TOLERANCE]:
             operator.phase, operator.leave_s = DWELL, t_s + goal[DWELL_TIME]
         else:
-            _move(law, gains, operator, memory, t_s)
-    elif t_s >= operator.leave_s:
-        _begin(law, gains, operator, memory, operator.index + 1, t_s)
+            _move(law, gains, operator, memory, t_s, mapping)
+    elif t_s >= operator.leave_s and operator.roll == goal[TURNED]:
+        _begin(law, gains, operator, memory, operator.index + 1, t_s, mapping)
     elif goal[PUSH] == 0.0 and _distance(operator) > goal[TOLERANCE]:
-        _move(law, gains, operator, memory, t_s)
+        _move(law, gains, operator, memory, t_s, mapping)
 
 
 @compiled
@@ -393,3 +374,14 @@ def _close_jaw(law: OperatorLaw, gains: Array, operator: Operator) -> None:
     if law.goal_count > 0:
         wanted = _goal(law, gains, min(operator.index, law.goal_count - 1))[CLOSED]
     operator.jaw += min(max(wanted - operator.jaw, -law.jaw_step), law.jaw_step)
+
+
+@compiled
+def _turn(law: OperatorLaw, gains: Array, operator: Operator) -> None:
+    """Turn the grip as the goal, or the last one, wants it."""
+    if law.goal_count > 0:
+        left = _goal(law, gains, min(operator.index, law.goal_count - 1))[TURNED] - operator.roll
+        if abs(left) <= law.roll_step:
+            operator.roll = _goal(law, gains, min(operator.index, law.goal_count - 1))[TURNED]
+        else:
+            operator.roll += law.roll_step if left > 0.0 else -law.roll_step

@@ -8,18 +8,24 @@ from surgsim.teleop.bilateral.base import End
 from surgsim.teleop.bilateral.ends import CalledScheme, ask, see
 from surgsim.teleop.channel import Channel, ChannelLaw
 from surgsim.teleop.console import ConsoleLaw, ConsoleMemory, renderable, step_console
+from surgsim.teleop.hand import HandAction
 from surgsim.teleop.mapping import (
+    Mapping,
+    MappingLaw,
     feedback_force,
     force_to_console,
     force_to_remote,
     motion_to_remote,
+    remap,
     to_remote,
 )
-from surgsim.teleop.messages import CONTENT, JAW, OFF, POSITION, SCHEME, TDPA, VELOCITY
-from surgsim.teleop.operator import HandAction, Operator, OperatorLaw, operate
+from surgsim.teleop.messages import CONTENT, JAW, OFF, POSITION, ROLL, ROLL_RATE, SCHEME, TDPA, VELOCITY
+from surgsim.teleop.operator import Operator, OperatorLaw, operate
 from surgsim.teleop.passivity_control import PassivityLaw, PortEnergy, impedance_control, observe, observed
 from surgsim.teleop.receiver import Receiver, ReceiverLaw, receive
+from surgsim.teleop.roll import RollLaw, rate_about
 from surgsim.teleop.tank import Tank, TankLaw, affordable, exchange, level, send_surplus
+from surgsim.teleop.tremor_filter import TremorFilter, TremorFilterLaw, steady
 from surgsim.tick.algebra import dot
 from surgsim.tick.arrays import Array, Record
 from surgsim.tick.python_part import enter
@@ -51,6 +57,8 @@ OPERATOR_COLUMNS = (
     scalar("goals_missed"),
     scalar("operator_done"),
     scalar("handle_stop"),
+    scalar("clutch_engaged"),
+    scalar("motion_scale"),
 )
 
 
@@ -65,7 +73,10 @@ class OperatorSideLaw(Record):
         entry: What enters the hand in Python, see `surgsim.tick.python_part` (1,).
         start_tip: The tip until something is received (3,) [m].
         console: The console.
-        operator: The simulated operator, and the mapping between console and world.
+        operator: The simulated operator.
+        mapping: Of the mapping between console and world.
+        tremor_filter: Of what the handle tells the remote side.
+        roll: Of the instrument's roll.
         receiver: Of what comes from the remote side.
         has_video: Whether the picture has a channel of its own.
         screen: The receiver of the picture.
@@ -83,6 +94,9 @@ class OperatorSideLaw(Record):
     start_tip: Array
     console: ConsoleLaw
     operator: OperatorLaw
+    mapping: MappingLaw
+    tremor_filter: TremorFilterLaw
+    roll: RollLaw
     receiver: ReceiverLaw
     has_video: int
     screen: ReceiverLaw
@@ -99,13 +113,16 @@ class OperatorSide(Record):
         of_scheme: Whether the energy is the bilateral scheme's.
         t_s: Time [s].
         scale: Share of the force that the tank can pay for.
+        roll: The instrument's roll that the grip stands for [rad].
         tip: The tip as it is known (3,) [m].
         seen: The tip as the screen shows it (3,) [m].
         wrench: What the motors are to render, force and zeros (6,) [N, N m].
         desired: Force before the tank or the passivity controller (3,) [N].
         path: Motion of the handle over the period (3,) [m].
-        content: The message, ten numbers.
+        content: The message, twelve numbers.
         console: The console.
+        mapping: Between console and world.
+        tremor_filter: Of what the handle tells the remote side.
         hand: What the hand does.
         operator: The simulated operator.
         receiver: Of what comes from the remote side.
@@ -124,6 +141,7 @@ class OperatorSide(Record):
     of_scheme: int
     t_s: float
     scale: float
+    roll: float
     tip: Array
     seen: Array
     wrench: Array
@@ -131,6 +149,8 @@ class OperatorSide(Record):
     path: Array
     content: Array
     console: ConsoleMemory
+    mapping: Mapping
+    tremor_filter: TremorFilter
     hand: HandAction
     operator: Operator
     receiver: Receiver
@@ -163,7 +183,7 @@ def receive_at_operator(
         if not law.has_video:
             side.seen[i] = side.tip[i]
     handle = side.console.state
-    feedback_force(law.operator.mapping, handle.position, side.tip, law.stiffness_n_per_m, side.desired)
+    feedback_force(side.mapping, handle.position, side.tip, law.stiffness_n_per_m, side.desired)
     renderable(law.console, side.console, side.desired)
     return received
 
@@ -173,21 +193,25 @@ def make_passive(law: OperatorSideLaw, side: OperatorSide) -> None:
     """Force that the tank can pay for, or that the passivity controller lets through.
 
     With a tank below its target a damper of `refill_damping_ns_per_mj` times the shortage refills it from the
-    operator's motion, as the tank-level controller of Franken et al., IEEE Trans. Robot. 27(4), 2011.
+    operator's motion, as the tank-level controller of Franken et al., IEEE Trans. Robot. 27(4), 2011. What a
+    damper adds is felt as far as the clutch is engaged; what it then does not burn stays to be burnt.
     """
-    force, velocity = side.wrench[:3], side.console.state.velocity
+    force, velocity, engaged = side.wrench[:3], side.console.state.velocity, side.mapping.engaged
     for i in range(3):
         force[i] = side.desired[i]
     if law.passivity == OFF:
         return
     if law.passivity == TDPA:
         impedance_control(law.control, side.port, force, velocity, law.period_s, force)
+        if engaged < 1.0:
+            for i in range(3):
+                force[i] = side.desired[i] + engaged * (force[i] - side.desired[i])
         renderable(law.console, side.console, force)
         return
     shortage = max(law.tank.target_j - level(side.tank), 0.0)
     if shortage > 0.0:
         for i in range(3):
-            force[i] -= law.refill_damping_ns_per_mj * shortage * velocity[i]
+            force[i] -= engaged * (law.refill_damping_ns_per_mj * shortage * velocity[i])
         renderable(law.console, side.console, force)
     work = law.period_s * dot(force, velocity)
     own = 0.5 * (law.period_s * law.period_s) * dot(force, force) / law.console.least_mass_kg
@@ -197,9 +221,9 @@ def make_passive(law: OperatorSideLaw, side: OperatorSide) -> None:
 
 
 @compiled
-def _place_end(law: OperatorSideLaw, side: OperatorSide) -> None:
+def _place_end(side: OperatorSide) -> None:
     """The handle as the scheme sees it: in the axes and the scale of the tip."""
-    end, handle, mapping = side.end, side.console.state, law.operator.mapping
+    end, handle, mapping = side.end, side.console.state, side.mapping
     to_remote(mapping, handle.position, end.position)
     motion_to_remote(mapping, handle.velocity, end.velocity)
     force_to_remote(mapping, side.hand.wrench[:3], end.force)
@@ -208,10 +232,11 @@ def _place_end(law: OperatorSideLaw, side: OperatorSide) -> None:
 @compiled
 def _feel(law: OperatorSideLaw, gains: Array, side: OperatorSide, memory: Array, received_j: float) -> int:
     """The force of the bilateral scheme, within what the console can render."""
-    end, mapping = side.end, law.operator.mapping
+    end, mapping = side.end, side.mapping
     see(law.receiver, side.receiver, end, side.t_s, law.period_s, received_j)
-    end.mobility_per_kg = mapping.scale * mapping.scale / law.console.least_mass_kg
-    _place_end(law, side)
+    gain = mapping.engaged * mapping.scale
+    end.mobility_per_kg = gain * gain / law.console.least_mass_kg
+    _place_end(side)
     status = ask(law.scheme.feel, law.scheme, gains, end, memory)
     force_to_console(mapping, end.command, side.desired)
     renderable(law.console, side.console, side.desired)
@@ -223,7 +248,7 @@ def _feel(law: OperatorSideLaw, gains: Array, side: OperatorSide, memory: Array,
 @compiled
 def _tell(law: OperatorSideLaw, gains: Array, side: OperatorSide, memory: Array, rendered_j: float) -> int:
     """The message of the bilateral scheme."""
-    _place_end(law, side)
+    _place_end(side)
     side.end.work_j = rendered_j
     status = ask(law.scheme.tell, law.scheme, gains, side.end, memory)
     side.content[:] = side.end.content
@@ -256,6 +281,17 @@ def _settle(law: OperatorSideLaw, side: OperatorSide, rendered_j: float, receive
 
 
 @compiled
+def _tell_grip(law: OperatorSideLaw, side: OperatorSide) -> None:
+    """Jaw and roll in the message; the roll adds up what the clutch passes on of the grip's turn."""
+    handle, content = side.console.state, side.content
+    rate = 0.0
+    if law.roll.use:
+        rate = side.mapping.engaged * rate_about(handle.rotation, 0, handle.angular_velocity)
+    side.roll += law.period_s * rate
+    content[JAW], content[ROLL], content[ROLL_RATE] = side.hand.jaw, side.roll, rate
+
+
+@compiled
 def step_operator_side(
     law: OperatorSideLaw,
     gains: Array,
@@ -277,6 +313,7 @@ def step_operator_side(
     Returns:
         A status, and the energy to be sent [J].
     """
+    remap(law.mapping, gains, side.mapping, side.t_s, side.console.state.position, side.hand.clutch)
     received = receive_at_operator(law, side, line, channel, memory)
     status = GOES_ON
     if law.passivity == SCHEME:
@@ -289,20 +326,30 @@ def step_operator_side(
         status = enter(law.entry)
     else:
         operate(
-            law.operator, gains, side.operator, memory, side.t_s, side.seen, side.console.state, side.hand
+            law.operator,
+            gains,
+            side.operator,
+            memory,
+            side.t_s,
+            side.seen,
+            side.console.state,
+            side.mapping,
+            side.hand,
         )
     if status != GOES_ON:
         return status, 0.0
     rendered = _move_console(law, side)
     if law.passivity == SCHEME:
         status = _tell(law, gains, side, memory, rendered)
-        side.content[JAW] = side.hand.jaw
+        _tell_grip(law, side)
         return status, side.end.energy_j
     energy = _settle(law, side, rendered, received)
     handle = side.console.state
-    to_remote(law.operator.mapping, handle.position, side.content[POSITION : POSITION + 3])
-    motion_to_remote(law.operator.mapping, handle.velocity, side.content[VELOCITY : VELOCITY + 3])
-    side.content[JAW] = side.hand.jaw
+    position, velocity = side.content[POSITION : POSITION + 3], side.content[VELOCITY : VELOCITY + 3]
+    to_remote(side.mapping, handle.position, position)
+    motion_to_remote(side.mapping, handle.velocity, velocity)
+    steady(law.tremor_filter, side.tremor_filter, side.t_s, position, velocity)
+    _tell_grip(law, side)
     return status, energy
 
 
@@ -320,7 +367,7 @@ def fill_operator_columns(side: OperatorSide, out: Array) -> None:
         out[15 + i], out[18 + i] = handle.position[i], handle.velocity[i]
         out[21 + i], out[24 + i], out[27 + i] = side.wrench[i], hand.wrench[i], hand.intended[i]
     out[30], out[31], out[32], out[33] = hand.jaw, hand.goal, hand.missed, hand.done
-    out[34] = handle.stop
+    out[34], out[35], out[36] = handle.stop, side.mapping.engaged, side.mapping.scale
     if side.of_scheme:
         end = side.end
         out[0], out[1], out[2], out[5] = end.stored_j, end.burnt_j, end.deficit_j, end.observed_j

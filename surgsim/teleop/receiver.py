@@ -44,7 +44,7 @@ class Receiver(Record):
         highest: Highest number of a packet so far, -1 before the first.
         newest_s: When it came [s].
         sent_s: When it was sent [s].
-        content: Its message, ten numbers.
+        content: Its message, twelve numbers.
         received_j: Energy received [J].
         late_packets: Packets that came after one sent later.
         duplicate_packets: Packets that came again.

@@ -8,7 +8,7 @@ from surgsim.compiled import compiled
 from surgsim.teleop.bilateral.base import End
 from surgsim.teleop.bilateral.ends import CalledScheme, ask, see
 from surgsim.teleop.channel import Channel, ChannelLaw
-from surgsim.teleop.messages import JAW, OFF, POSITION, SCHEME, TDPA, VELOCITY
+from surgsim.teleop.messages import JAW, OFF, POSITION, ROLL, ROLL_RATE, SCHEME, TDPA, VELOCITY
 from surgsim.teleop.passivity_control import (
     PassivityLaw,
     PortEnergy,
@@ -20,6 +20,7 @@ from surgsim.teleop.passivity_control import (
     observed,
 )
 from surgsim.teleop.receiver import Receiver, ReceiverLaw, receive, trust
+from surgsim.teleop.roll import RollLaw, rate_about, roll_rate
 from surgsim.teleop.tank import Tank, TankLaw, budget, exchange, level, send_surplus
 from surgsim.tick.algebra import dot, norm
 from surgsim.tick.arrays import Array, Record
@@ -39,6 +40,8 @@ REMOTE_COLUMNS = (
     scalar("duplicate_packets"),
     vector("velocity_command", "m_per_s"),
     scalar("jaw"),
+    scalar("roll_command", "rad"),
+    scalar("roll", "rad"),
 )
 
 
@@ -54,6 +57,7 @@ class RemoteSideLaw(Record):
         tank: The energy tank.
         control: The passivity controller.
         scheme: The bilateral scheme.
+        roll: Of the instrument's roll.
     """
 
     passivity: int
@@ -64,6 +68,7 @@ class RemoteSideLaw(Record):
     tank: TankLaw
     control: PassivityLaw
     scheme: CalledScheme
+    roll: RollLaw
 
 
 class RemoteSide(Record):
@@ -73,6 +78,8 @@ class RemoteSide(Record):
         environment_j: Energy that the tip gave to its environment [J].
         trust: In the set point, from 0 to 1.
         jaw: How far the jaws close.
+        roll: Roll of the instrument since the start [rad].
+        roll_rate: Commanded [rad/s].
         budget_j: Right side of the passivity row, T - epsilon [J]; infinite without a tank.
         wanted: Velocity before the passivity controller (3,) [m/s].
         velocity: v_d (3,) [m/s].
@@ -92,6 +99,8 @@ class RemoteSide(Record):
     environment_j: float
     trust: float
     jaw: float
+    roll: float
+    roll_rate: float
     budget_j: float
     wanted: Array
     velocity: Array
@@ -247,6 +256,21 @@ def step_remote_side(
 
 
 @compiled
+def lead_roll(law: RemoteSideLaw, side: RemoteSide, R_WT: Array, w_WT: Array) -> None:
+    """Add up the instrument's roll about its shaft, and set the rate for the period.
+
+    Args:
+        law: Numbers of the side.
+        side: Has received and trusts already.
+        R_WT: Orientation of the instrument as measured (3, 3).
+        w_WT: Its angular velocity (3,) [rad/s].
+    """
+    order = side.receiver.content
+    side.roll += law.period_s * rate_about(R_WT, 2, w_WT)
+    side.roll_rate = roll_rate(law.roll, side.trust, order[ROLL_RATE], order[ROLL], side.roll)
+
+
+@compiled
 def fill_remote_columns(side: RemoteSide, out: Array) -> None:
     """Values of `REMOTE_COLUMNS`, SI units by their suffix."""
     tank, receiver = side.tank, side.receiver
@@ -256,7 +280,7 @@ def fill_remote_columns(side: RemoteSide, out: Array) -> None:
     out[9], out[10] = receiver.late_packets, receiver.duplicate_packets
     for i in range(3):
         out[11 + i] = side.velocity[i]
-    out[14] = side.jaw
+    out[14], out[15], out[16] = side.jaw, receiver.content[ROLL], side.roll
     if side.of_scheme:
         end = side.end
         out[0], out[1], out[2], out[5] = end.stored_j, end.burnt_j, end.deficit_j, end.observed_j

@@ -3,7 +3,8 @@
         x_o, v_o, jaw ── channel ──▶ v_d = trust (v + k (x - p_WT)),  budget T - epsilon ──▶ controller
         hand ◀── K_v (p_WT(t - delta) - x_o) ◀── channel ── p_WT, force, energy ◀── arm
 
-The numbers are a `Law`, then the goals' rows; the memory is a `State`, then the tables of `Places`.
+The numbers are a `Law`, then the rows of goals and of changes of scale; the memory is a `State`, then the
+tables of `Places`.
 """
 
 import math
@@ -29,6 +30,7 @@ from surgsim.teleop.remote_side import (
     RemoteSide,
     RemoteSideLaw,
     fill_remote_columns,
+    lead_roll,
     step_remote_side,
 )
 from surgsim.teleop.tip_work import TipWork, add_tip_work
@@ -52,7 +54,7 @@ DRAWN = 1024
 
 
 class Law(Record):
-    """All numbers of a teleoperation but the goals.
+    """All numbers of a teleoperation but the goals and the changes of scale.
 
     Attributes:
         hold_end_s: Time at rest after the operator is done [s].
@@ -86,7 +88,7 @@ class State(Record):
         is_done: Whether the operator is done.
         done_s: Since when [s].
         velocity: v_d of the last period (3,) [m/s].
-        content: The message of the remote side, ten numbers.
+        content: The message of the remote side, twelve numbers.
         operator: The operator's side.
         remote: The remote side.
         forth: The channel to the remote side.
@@ -196,6 +198,7 @@ def teleoperate(gains: Array, feedback: Feedback, memory: Array, out: Command) -
     )
     if status != GOES_ON:
         return status
+    lead_roll(law.remote, remote, feedback.R_WT, feedback.w_WT)
     if law.remote.passivity == SCHEME:
         state.content[:] = remote.end.content
     send(law.back, state.back, memory, t_s, state.content, energy)
@@ -221,7 +224,7 @@ def _tell(law: Law, state: State, feedback: Feedback, out: Command) -> None:
         out.a_WTd[i] = (remote.velocity[i] - state.velocity[i]) / law.remote.period_s
         state.velocity[i] = remote.velocity[i]
         out.budget_f_T[i] = feedback.f_T[i] if limited else 0.0
-    out.jaw, out.budget_j = remote.jaw, remote.budget_j
+    out.jaw, out.budget_j, out.roll_rate = remote.jaw, remote.budget_j, remote.roll_rate
 
 
 @compiled
@@ -232,5 +235,5 @@ def _record(law: Law, state: State, t_s: float, values: Array) -> None:
     fill_remote_columns(remote, values[_REMOTE:])
     fill_account(law.operator, operator, law.remote, remote, state.forth, state.back, values[_ACCOUNT:])
     velocity = operator.console.state.velocity
-    motion_to_remote(law.operator.operator.mapping, velocity, values[_ISSUED : _ISSUED + 3])
+    motion_to_remote(operator.mapping, velocity, values[_ISSUED : _ISSUED + 3])
     values[_AGE] = t_s - remote.receiver.sent_s if remote.receiver.highest >= 0 else math.nan

@@ -16,7 +16,7 @@ from surgsim.tasks.teleoperation import TeleoperationConfig
 from surgsim.tasks.teleoperation_program import GoalConfig, board_goals, way_points
 from surgsim.teleop.bilateral.passive_convex import PassiveConvexConfig
 from surgsim.teleop.channel import ChannelConfig
-from surgsim.teleop.operator import HandCommand
+from surgsim.teleop.hand import HandCommand
 from surgsim.teleop.tip_work import TipWork, add_tip_work
 from surgsim.tick.arrays import new
 

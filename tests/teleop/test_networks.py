@@ -13,8 +13,8 @@ from surgsim.simulate.loop import Simulation, simulate
 from surgsim.simulate.setup import prepare
 from surgsim.tasks.teleoperation import TeleoperationConfig
 from surgsim.teleop.channel import COPY, EXTRA, LOST, Channel, ChannelConfig, JumpConfig, draw_packets
+from surgsim.teleop.hand import HandCommand
 from surgsim.teleop.networks import NETWORKS
-from surgsim.teleop.operator import HandCommand
 from surgsim.tick.arrays import new
 
 H = 0.001

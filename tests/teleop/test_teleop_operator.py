@@ -7,15 +7,14 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from surgsim.teleop.console import ConsoleConfig, new_console, step_console
-from surgsim.teleop.mapping import MappingConfig, align, to_remote
+from surgsim.teleop.goals import Goal, goal_rows
+from surgsim.teleop.hand import HandAction
+from surgsim.teleop.mapping import Mapping, MappingConfig, align, to_remote
 from surgsim.teleop.operator import (
-    Goal,
-    HandAction,
     Operator,
     OperatorConfig,
     OperatorLaw,
     describe_operator,
-    goal_rows,
     operate,
 )
 from surgsim.teleop.reach import Reach, ReachConfig, ReachLaw, aim, movement_time, reach_at, scatter
@@ -34,7 +33,8 @@ class Alone:
         self._console, self.law, self.handle = new_console(ConsoleConfig())
         self.operator, self.state, self.action = new(OperatorLaw, 0), new(Operator, 0), new(HandAction, 0)
         noise = describe_operator(self.operator, config, PERIOD_S, 0.3)
-        align(self.operator.mapping, MappingConfig(scale=scale), self.handle.state.position, np.zeros(3))
+        self.mapping = new(Mapping, 0)
+        align(self.mapping, MappingConfig(scale=scale), self.handle.state.position, np.zeros(3))
         self.operator.goal_count, self.operator.scatter = len(goals), 3 * periods
         random = np.random.default_rng(seed)
         self._goals = goal_rows(goals).ravel()
@@ -43,7 +43,7 @@ class Alone:
 
     def decide(self, t_s, seen):
         draws, handle = self._draws.ravel(), self.handle.state
-        operate(self.operator, self._goals, self.state, draws, t_s, seen, handle, self.action)
+        operate(self.operator, self._goals, self.state, draws, t_s, seen, handle, self.mapping, self.action)
         return self.action.copy()
 
     def move(self, wrench):
@@ -51,7 +51,7 @@ class Alone:
 
     def tip(self):
         tip = np.zeros(3)
-        to_remote(self.operator.mapping, self.handle.state.position, tip)
+        to_remote(self.mapping, self.handle.state.position, tip)
         return tip
 
 

@@ -9,7 +9,8 @@ from surgsim.scenario.load import load_scenario
 from surgsim.simulate.loop import Simulation
 from surgsim.simulate.setup import prepare
 from surgsim.teleop.channel import ChannelConfig
-from surgsim.teleop.operator import HandCommand, OperatorConfig
+from surgsim.teleop.hand import HandCommand
+from surgsim.teleop.operator import OperatorConfig
 from surgsim.teleop.tank import TankConfig
 from surgsim.teleop.teleoperator import COLUMNS
 

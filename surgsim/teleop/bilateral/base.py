@@ -31,7 +31,7 @@ class End(Record):
         known: Whether anything has been received.
         fresh: Whether a newer message came in this period.
         trust: In the newest message, from 0 to 1: it fades while nothing arrives.
-        received: The newest message of the other end, ten numbers as in `surgsim.teleop.messages`.
+        received: The newest message of the other end, twelve numbers as in `surgsim.teleop.messages`.
         received_j: Energy that came in this period [J].
         position: Of the handle, as the tip that it stands for, or of the tip (3,) [m].
         velocity: The same (3,) [m/s].
@@ -40,7 +40,7 @@ class End(Record):
             `feel` it is that of the last period, in `tell` of this one, in `follow` of the last.
         mobility_per_kg: Largest inverse mass that a force on the handle meets [1/kg]; 0 at the remote end.
         command: Answer: force on the handle (3,) [N], or velocity of the tip (3,) [m/s].
-        content: Answer: the message, ten numbers; the jaw's place is filled by others.
+        content: Answer: the message, twelve numbers; the places of jaw and roll are filled by others.
         energy_j: Answer: energy to be sent with it, not negative [J].
         stored_j: Answer: energy in stock at this end, without what is sent now [J].
         burnt_j: Answer: energy given up so far [J].

@@ -6,10 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surgsim.teleop.console import ConsoleState
+from surgsim.teleop.hand import HandCommand
 from surgsim.teleop.impedance import Grip, hand_wrench
 from surgsim.teleop.manual.intent import Intent, Source
-from surgsim.teleop.mapping import MappingConfig, rotation_matrix
-from surgsim.teleop.operator import HandCommand, OperatorConfig
+from surgsim.teleop.mapping import MappingConfig, MappingLaw, describe_mapping, rotation_matrix, scale_at
+from surgsim.teleop.operator import OperatorConfig
 from surgsim.tick.arrays import new
 from surgsim.tick.overlay import take
 
@@ -39,7 +40,9 @@ class LiveHand:
     ) -> None:
         self._source, self._period, self._grip = source, period_s, new(Grip, 0)
         take(self._grip, config)
-        self._R_OW = rotation_matrix(mapping.rotation_wxyz).T / mapping.scale
+        self._R_OW, self._mapping = rotation_matrix(mapping.rotation_wxyz).T, new(MappingLaw, 0)
+        describe_mapping(self._mapping, mapping, period_s)
+        self._changes = mapping.change_rows().ravel()
         self._blur = 1.0 - math.exp(-period_s / EASE_S)
         self._jaw_step = period_s / config.jaw_time_s
         self._velocity = np.zeros(3)
@@ -51,7 +54,8 @@ class LiveHand:
         if self._position is None:
             self._position, self._upright = handle.position.copy(), handle.rotation.copy()
         intent = self._source(t_s)
-        intended = self._position = self._moved(self._position, intent, handle)
+        scale = scale_at(self._mapping, self._changes, t_s)
+        intended = self._position = self._moved(self._position, intent, handle, scale)
         self._jaw += min(max(intent.jaw - self._jaw, -self._jaw_step), self._jaw_step)
         wrench = np.zeros(6)
         hand_wrench(self._grip, intended, self._velocity, self._upright, handle, wrench)
@@ -64,8 +68,9 @@ class LiveHand:
             intended=intended,
         )
 
-    def _moved(self, position: Array, intent: Intent, handle: ConsoleState) -> Array:
-        self._velocity = self._velocity + self._blur * (self._R_OW @ intent.velocity - self._velocity)
+    def _moved(self, position: Array, intent: Intent, handle: ConsoleState, scale: float) -> Array:
+        wanted = self._R_OW / scale @ intent.velocity
+        self._velocity = self._velocity + self._blur * (wanted - self._velocity)
         lead = position + self._period * self._velocity - handle.position
         length = math.sqrt(float(lead @ lead))
         return np.asarray(handle.position + lead * (LEAD_M / max(length, LEAD_M)))
