@@ -21,10 +21,14 @@ class Wish:
 
     Attributes:
         direction: Right, away and up on the screen, each from -1 to 1 (3,).
+        roll: Turn of the grip to the right, from -1 to 1.
+        clutch: Whether the clutch's pedal is pressed.
         actions: What was pressed since it was asked last.
     """
 
     direction: Array
+    roll: float = 0.0
+    clutch: bool = False
     actions: tuple[Action, ...] = ()
 
 
@@ -52,7 +56,7 @@ class Controls:
 
     @property
     def intent(self) -> Intent:
-        """What the operator wants now; once done, no motion and the jaws as they are."""
+        """What the operator wants now; once done, no motion, a closed clutch and the jaws as they are."""
         return Intent(jaw=self._intent.jaw, end=True) if self._ended else self._intent
 
     def __call__(self, t_s: float) -> Intent:
@@ -73,7 +77,9 @@ class Controls:
                 self._speed = min(max(self._speed + step, 0), len(SPEEDS_M_PER_S) - 1)
         direction = np.clip(sum((wish.direction for wish in wishes), np.zeros(3)), -1.0, 1.0)
         x, y, z = (self.speed_m_per_s * (axes @ direction)).tolist()
-        self._intent = Intent(velocity=(x, y, z), jaw=jaw)
+        roll = min(max(sum(wish.roll for wish in wishes), -1.0), 1.0)
+        clutch = any(wish.clutch for wish in wishes)
+        self._intent = Intent(velocity=(x, y, z), jaw=jaw, roll=roll, clutch=clutch)
 
     def end(self) -> None:
         """The operator is done. May be called by a signal's handler, at any moment."""

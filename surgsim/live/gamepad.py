@@ -16,10 +16,15 @@ _EVENT = struct.Struct("<IhBB")
 _BUTTON, _AXIS, _INITIAL = 1, 2, 0x80
 _FULL = 32767.0
 DEAD_ZONE = 0.15
+ROLL_AXIS, CLUTCH_AXIS = 3, 2
+"""Right stick across, and the left trigger: a pedal that counts as pressed from half its way on."""
 AXES: Mapping[int, tuple[int, float]] = {0: (0, 1.0), 1: (1, -1.0), 4: (2, -1.0)}
 """Left stick: right and away; right stick: up. A stick pushed away or up gives negative values."""
 BUTTONS: Mapping[int, Action] = {0: "jaw", 4: "slower", 5: "faster"}
-HELP = "left stick: left, right, away, near | right stick: up, down | A: jaws | LB RB: speed | Esc: end"
+HELP = (
+    "left stick: left, right, away, near | right stick: up, down, roll left, right | "
+    "left trigger, held: clutch open | A: jaws | LB RB: speed | Esc: end"
+)
 
 
 def find_gamepad(folder: Path = Path("/dev/input")) -> Path:
@@ -35,7 +40,7 @@ def find_gamepad(folder: Path = Path("/dev/input")) -> Path:
 
 
 class Gamepad:
-    """Sticks move the tip, faster the further they are pushed; unplugged, they are at rest."""
+    """Sticks move the tip, faster the further they are pushed; unplugged, all is at rest."""
 
     def __init__(self, path: Path) -> None:
         """Open the device.
@@ -48,6 +53,7 @@ class Gamepad:
         except OSError as error:
             raise SurgsimError(f"the gamepad {path} cannot be read: {error.strerror}") from error
         self._direction = np.zeros(3)
+        self._roll, self._clutch = 0.0, False
         self._rest = b""
 
     def poll(self, t_s: float) -> Wish:
@@ -57,12 +63,26 @@ class Gamepad:
         self._rest = data[whole:]
         actions: list[Action] = []
         for _, value, kind, number in _EVENT.iter_unpack(data[:whole]):
-            if kind & ~_INITIAL == _AXIS and number in AXES:
-                axis, sign = AXES[number]
-                self._direction[axis] = sign * _deflection(value)
+            if kind & ~_INITIAL == _AXIS:
+                self._moved(number, value)
             elif kind == _BUTTON and value and number in BUTTONS:
                 actions.append(BUTTONS[number])
-        return Wish(direction=self._direction.copy(), actions=tuple(actions))
+        return Wish(
+            direction=self._direction.copy(),
+            roll=self._roll,
+            clutch=self._clutch,
+            actions=tuple(actions),
+        )
+
+    def _moved(self, number: int, value: int) -> None:
+        """A stick or a trigger moved."""
+        if number in AXES:
+            axis, sign = AXES[number]
+            self._direction[axis] = sign * _deflection(value)
+        elif number == ROLL_AXIS:
+            self._roll = _deflection(value)
+        elif number == CLUTCH_AXIS:
+            self._clutch = value > 0
 
     def _read(self) -> bytes:
         data = b""
@@ -86,6 +106,7 @@ class Gamepad:
                 os.close(self._file)
         self._file = None
         self._direction[:] = 0.0
+        self._roll, self._clutch = 0.0, False
 
     def __enter__(self) -> Self:
         return self

@@ -7,7 +7,7 @@ import numpy as np
 
 from surgsim.live.controls import Action, Wish
 
-_RIGHT, _LEFT, _DOWN, _UP, _PAGE_UP, _PAGE_DOWN = range(262, 268)
+_RIGHT, _LEFT, _DOWN, _UP, _PAGE_UP, _PAGE_DOWN, _HOME, _END = range(262, 270)
 DIRECTIONS: Mapping[int, tuple[int, float]] = {
     _RIGHT: (0, 1.0),
     _LEFT: (0, -1.0),
@@ -16,6 +16,9 @@ DIRECTIONS: Mapping[int, tuple[int, float]] = {
     _PAGE_UP: (2, 1.0),
     _PAGE_DOWN: (2, -1.0),
 }
+ROLLS: Mapping[int, float] = {_HOME: -1.0, _END: 1.0}
+CLUTCHES = (341, 345)
+"""The two Ctrl keys: the pedal of the clutch."""
 ACTIONS: Mapping[int, Action] = {
     32: "jaw",  # space
     256: "end",  # escape
@@ -24,12 +27,15 @@ ACTIONS: Mapping[int, Action] = {
     334: "faster",  # + of the number pad
     333: "slower",  # - of the number pad
 }
-HELP = "arrows: left, right, away, near | Page Up/Down: up, down | Space: jaws | + -: speed | Esc: end"
+HELP = (
+    "arrows: left, right, away, near | Page Up/Down: up, down | Home End: roll left, right | "
+    "Ctrl, held: clutch open | Space: jaws | + -: speed | Esc: end"
+)
 TAP_S = 0.05
 
 
 class Keyboard:
-    """A key moves the tip for as long as it is held, and at least for `TAP_S` of simulated time.
+    """A key acts for as long as it is held, one that moves at least for `TAP_S` of simulated time.
 
     `changed` may be called from another thread, e.g. the window's.
     """
@@ -53,13 +59,22 @@ class Keyboard:
                 break
             if pressed and key in ACTIONS:
                 actions.append(ACTIONS[key])
-            elif pressed and key in DIRECTIONS:
+            elif pressed and (key in DIRECTIONS or key in ROLLS):
                 self._down.add(key)
                 self._until[key] = t_s + TAP_S
+            elif pressed and key in CLUTCHES:
+                self._down.add(key)
             else:
                 self._down.discard(key)
         direction = np.zeros(3)
         for key, (axis, sign) in DIRECTIONS.items():
-            if key in self._down or t_s < self._until.get(key, -1.0):
-                direction[axis] += sign
-        return Wish(direction=direction, actions=tuple(actions))
+            direction[axis] += sign * self._acts(key, t_s)
+        return Wish(
+            direction=direction,
+            roll=sum(sign * self._acts(key, t_s) for key, sign in ROLLS.items()),
+            clutch=any(key in self._down for key in CLUTCHES),
+            actions=tuple(actions),
+        )
+
+    def _acts(self, key: int, t_s: float) -> bool:
+        return key in self._down or t_s < self._until.get(key, -1.0)

@@ -62,6 +62,7 @@ def drive(
             factor=pace.factor,
             speed_m_per_s=controls.speed_m_per_s,
             jaw=controls.intent.jaw,
+            clutch=controls.intent.clutch,
             force_n=_force_on_hand(setup),
             help=help,
         )

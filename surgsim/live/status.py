@@ -25,6 +25,7 @@ def status(
     factor: float,
     speed_m_per_s: float,
     jaw: float,
+    clutch: bool,
     force_n: float,
     help: str,
 ) -> Status:
@@ -36,6 +37,7 @@ def status(
             ("real time", f"{factor:.2f}x{slow}"),
             ("speed", f"{1e3 * speed_m_per_s:g} mm/s"),
             ("jaws", "closing" if jaw > 0.5 else "open"),
+            ("clutch", "open" if clutch else "closed"),
             ("force on the hand", f"{force_n:.1f} N"),
         ),
         help=help,

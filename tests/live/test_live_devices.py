@@ -12,6 +12,7 @@ from surgsim.live.gamepad import DEAD_ZONE, Gamepad, find_gamepad
 from surgsim.live.keyboard import TAP_S, Keyboard
 
 RIGHT, UP, PAGE_DOWN, SPACE, ESCAPE, MINUS, PLUS = 262, 265, 267, 32, 256, 45, 61
+HOME, END, LEFT_CTRL, RIGHT_CTRL = 268, 269, 341, 345
 
 
 class Script:
@@ -24,8 +25,8 @@ class Script:
         return self._wishes.pop(0) if self._wishes else Wish(direction=np.zeros(3))
 
 
-def wish(*actions, direction=(0.0, 0.0, 0.0)):
-    return Wish(direction=np.array(direction), actions=actions)
+def wish(*actions, direction=(0.0, 0.0, 0.0), roll=0.0, clutch=False):
+    return Wish(direction=np.array(direction), roll=roll, clutch=clutch, actions=actions)
 
 
 def test_keys_move_while_they_are_held():
@@ -57,6 +58,35 @@ def test_opposite_keys_cancel_and_actions_come_once():
     assert not first.direction.any()
     assert first.actions == ("jaw", "faster")
     assert keyboard.poll(0.1).actions == ()
+
+
+def test_end_rolls_to_the_right_and_home_to_the_left_while_they_are_held():
+    keyboard = Keyboard()
+    keyboard.changed(END, True)
+    assert keyboard.poll(0.0).roll == 1.0
+    keyboard.changed(HOME, True)
+    assert keyboard.poll(1.0).roll == 0.0
+    keyboard.changed(END, False)
+    assert keyboard.poll(2.0).roll == -1.0
+    keyboard.changed(HOME, False)
+    assert keyboard.poll(3.0).roll == 0.0
+    keyboard.changed(END, True)
+    keyboard.changed(END, False)
+    assert [keyboard.poll(t).roll for t in (4.0, 4.0 + 1.1 * TAP_S)] == [1.0, 0.0]
+
+
+def test_the_clutch_is_open_while_a_ctrl_key_is_held_and_the_other_keys_act():
+    keyboard = Keyboard()
+    assert not keyboard.poll(0.0).clutch
+    for key in (LEFT_CTRL, RIGHT_CTRL, UP):
+        keyboard.changed(key, True)
+    held = keyboard.poll(1.0)
+    assert held.clutch
+    assert held.direction.tolist() == [0.0, 1.0, 0.0]
+    keyboard.changed(LEFT_CTRL, False)
+    assert keyboard.poll(2.0).clutch
+    keyboard.changed(RIGHT_CTRL, False)
+    assert not keyboard.poll(2.0).clutch  # no longer than it is held
 
 
 def event(value, kind, number):
@@ -91,6 +121,20 @@ def test_small_deflections_are_rest_and_nothing_jumps_beyond(pad):
     assert 0.0 < direction[1] < 0.01
 
 
+def test_the_right_stick_rolls_and_the_left_trigger_is_the_pedal(pad):
+    gamepad, feed = pad
+    feed(event(-32767, 2 | 0x80, 2), event(int(0.99 * DEAD_ZONE * 32767), 2, 3))
+    rest = gamepad.poll(0.0)
+    assert (rest.roll, rest.clutch) == (0.0, False)
+    feed(event(32767, 2, 3), event(20000, 2, 2))
+    pulled = gamepad.poll(0.1)
+    assert (pulled.roll, pulled.clutch) == (1.0, True)
+    assert not pulled.direction.any()
+    feed(event(-32768, 2, 3), event(-100, 2, 2))
+    let_go = gamepad.poll(0.2)
+    assert (let_go.roll, let_go.clutch) == (-1.0, False)
+
+
 def test_buttons_count_when_they_go_down_and_events_may_come_in_pieces(pad):
     gamepad, feed = pad
     whole = event(1, 1, 0) + event(0, 1, 0) + event(1, 1, 5) + event(1, 1 | 0x80, 0)
@@ -102,15 +146,19 @@ def test_buttons_count_when_they_go_down_and_events_may_come_in_pieces(pad):
 
 def test_an_unplugged_gamepad_is_at_rest(pad, monkeypatch):
     gamepad, feed = pad
-    feed(event(32767, 2, 0))
-    assert gamepad.poll(0.0).direction.any()
+    feed(event(32767, 2, 0), event(32767, 2, 2), event(32767, 2, 3))
+    before = gamepad.poll(0.0)
+    assert before.direction.any()
+    assert (before.roll, before.clutch) == (1.0, True)
 
     def gone(*_):
         raise OSError(19, "No such device")
 
     monkeypatch.setattr(os, "read", gone)
-    assert not gamepad.poll(0.1).direction.any()
-    assert not gamepad.poll(0.2).direction.any()
+    for _ in range(2):
+        after = gamepad.poll(0.1)
+        assert not after.direction.any()
+        assert (after.roll, after.clutch) == (0.0, False)
 
 
 def test_no_gamepad_is_said_in_one_line(tmp_path):
@@ -142,9 +190,18 @@ def test_speed_has_ends_and_two_devices_are_not_twice_as_fast():
     assert controls(0.0).velocity == (SPEEDS_M_PER_S[-1], 0.0, 0.0)
 
 
+def test_two_devices_roll_no_faster_than_one_and_either_opens_the_clutch():
+    controls = Controls([Script(wish(roll=0.7)), Script(wish(roll=0.7, clutch=True))])
+    controls.poll(0.0, np.eye(3))
+    assert (controls(0.0).roll, controls(0.0).clutch) == (1.0, True)
+    controls.poll(0.1, np.eye(3))
+    assert (controls(0.1).roll, controls(0.1).clutch) == (0.0, False)
+
+
 def test_who_is_done_stays_done_with_the_jaws_as_they_are():
     moving = wish(direction=(1.0, 0.0, 0.0))
-    controls = Controls([Script(wish("jaw"), wish("end", direction=(1.0, 0.0, 0.0)), moving)])
+    ending = wish("end", direction=(1.0, 0.0, 0.0), roll=1.0, clutch=True)
+    controls = Controls([Script(wish("jaw"), ending, moving)])
     controls.poll(0.0, np.eye(3))
     assert (controls.intent.jaw, controls.intent.end) == (1.0, False)
     for _ in range(2):
@@ -154,3 +211,4 @@ def test_who_is_done_stays_done_with_the_jaws_as_they_are():
             1.0,
             True,
         )
+        assert (controls.intent.roll, controls.intent.clutch) == (0.0, False)

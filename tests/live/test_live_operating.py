@@ -20,7 +20,7 @@ from surgsim.simulate.loop import Simulation
 from surgsim.simulate.setup import prepare
 
 SHORT = ("--set", "theatre=false", "--set", "task.hold_end_s=0.1", "--set", "task.channel.delay_s=0.05")
-RIGHT, UP, SPACE, ESCAPE = 262, 265, 32, 256
+RIGHT, UP, SPACE, ESCAPE, ROLL_RIGHT, CTRL = 262, 265, 32, 256, 269, 341
 
 
 class Clock:
@@ -132,6 +132,30 @@ def test_what_a_person_did_is_recorded_and_plays_back_bit_for_bit(person, tmp_pa
     tape.write_text("\n".join([*lines[:2], lines[2].replace("0.02", "0.021"), *lines[3:]]) + "\n")
     assert main([*again[:-1], "other"]) == 0
     assert "tip" in same(replay, read_recording(tmp_path / "other").trace)
+
+
+def test_a_person_rolls_the_instrument_and_re_indexes_the_handle(person, tmp_path):
+    script = (
+        (2, press(ROLL_RIGHT)),
+        (14, let_go(ROLL_RIGHT)),
+        (20, press(CTRL)),
+        (28, press(RIGHT)),
+        (40, let_go(RIGHT)),
+        (72, let_go(CTRL)),
+        (84, press(ESCAPE)),
+    )
+    assert person("--out", "live", "--set", "task.roll.use=true", script=script) == 0
+    assert dict(Scripted.shown[50].lines)["clutch"] == "open"
+    assert dict(Scripted.shown[-1].lines)["clutch"] == "closed"
+    live = read_recording(tmp_path / "live").trace
+    assert 0.1 < live["roll_command_rad"][-1] < 0.25
+    assert live["roll_rad"][-1] == pytest.approx(live["roll_command_rad"][-1], abs=5e-3)
+    opened = live["clutch_engaged"] == 0.0
+    assert np.ptp(live["handle_x_m"][opened]) > 1e-3
+    assert live["tip_x_m"][-1] == pytest.approx(live["tip_x_m"][0], abs=2e-4)
+    again = ["run", "live/scenario.yaml", "--operator", "live/operator_input.csv", "--out", "again"]
+    assert main(again) == 0
+    assert same(live, read_recording(tmp_path / "again").trace) == set()
 
 
 @pytest.mark.parametrize(

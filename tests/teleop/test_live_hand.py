@@ -7,11 +7,12 @@ from hypothesis import strategies as st
 
 from surgsim.errors import SurgsimError
 from surgsim.teleop.console import ConsoleConfig, new_console, step_console
-from surgsim.teleop.manual.hand import LEAD_M, LiveHand
+from surgsim.teleop.manual.hand import LEAD_M, LEAD_RAD, LiveHand
 from surgsim.teleop.manual.intent import Intent
 from surgsim.teleop.manual.tape import HEADER, Player, Recorder, read_tape
 from surgsim.teleop.mapping import MappingConfig, rotation_matrix
 from surgsim.teleop.operator import OperatorConfig
+from surgsim.teleop.roll import turn_grip
 
 TURNED = (0.5**0.5, 0.0, 0.0, 0.5**0.5)
 PLAIN = MappingConfig()
@@ -55,9 +56,52 @@ def test_jaws_close_in_their_time_and_the_end_is_passed_on():
     assert [command.done for command in commands] == [k >= 400 for k in range(500)]
 
 
+def test_the_clutch_is_passed_on_while_it_is_held():
+    _, commands = operate(lambda t: Intent(clutch=0.1 <= t < 0.3), 500)
+    assert [command.clutch for command in commands] == [100 <= k < 300 for k in range(500)]
+
+
+def grip_turn(state, upright):
+    """How far the handle is turned about the grip's axis [rad]: what the gimbal's roll says."""
+    turned = np.zeros((3, 3))
+    turn_grip(upright, state.q[5], turned)
+    assert state.rotation == pytest.approx(turned, abs=0.01)
+    return state.q[5]
+
+
+@pytest.mark.parametrize("roll", [1.0, -0.5])
+def test_the_grip_turns_at_the_wanted_rate_and_stays_where_it_is_let(roll):
+    _console, law, memory = new_console(ConsoleConfig())
+    config = OperatorConfig()
+    hand = LiveHand(config, PLAIN, lambda t: Intent(roll=roll if t < 1.0 else 0.0), 0.001)
+    state, turns = memory.state, []
+    upright = state.rotation.copy()
+    for k in range(1600):
+        command = hand.step(1e-3 * k, np.zeros(3), state)
+        step_console(law, memory, np.zeros(6), command.wrench)
+        turns.append(grip_turn(state, upright))
+    speed = config.roll_speed_rad_per_s * roll
+    assert (turns[900] - turns[500]) / 0.4 == pytest.approx(speed, rel=0.02)
+    assert turns[-1] == pytest.approx(speed * 1.0, abs=0.03)
+    assert turns[-1] == pytest.approx(turns[-301], abs=5e-3)
+
+
+def test_a_grip_that_is_held_winds_up_no_turn():
+    _, commands = operate(lambda t: Intent(roll=1.0 if t < 3.0 else -1.0), 3900, held=True)
+    torque = np.array([command.wrench[3:] for command in commands])
+    most = OperatorConfig().turn_stiffness_nm_per_rad * np.sin(LEAD_RAD)
+    assert np.linalg.norm(torque[2999]) == pytest.approx(most, rel=1e-6)
+    assert torque[3899] @ torque[2999] < 0.0  # 1 rad/s undoes the lead in half a second
+
+
 finite = st.floats(-10.0, 10.0)
 intents = st.builds(
-    Intent, velocity=st.tuples(finite, finite, finite), jaw=st.floats(0.0, 1.0), end=st.booleans()
+    Intent,
+    velocity=st.tuples(finite, finite, finite),
+    jaw=st.floats(0.0, 1.0),
+    roll=st.floats(-1.0, 1.0),
+    clutch=st.booleans(),
+    end=st.booleans(),
 )
 
 
@@ -78,19 +122,23 @@ def test_only_changes_are_recorded():
     recorder = Recorder(lambda t: Intent(velocity=(0.01 if t >= 0.5 else 0.0, 0.0, 0.0)))
     for k in range(1000):
         recorder(1e-3 * k)
-    assert recorder.text() == f"{','.join(HEADER)}\n0.0,0.0,0.0,0.0,0.0,0\n0.5,0.01,0.0,0.0,0.0,0\n"
+    assert (
+        recorder.text() == f"{','.join(HEADER)}\n0.0,0.0,0.0,0.0,0.0,0.0,0,0\n0.5,0.01,0.0,0.0,0.0,0.0,0,0\n"
+    )
 
 
 @pytest.mark.parametrize(
     ("lines", "reason"),
     [
-        (["0,0,0,0,0"], "2: 5 values, not 6"),
-        (["0,0,nan,0,0,0"], "2: velocity_y_m_per_s 'nan' is not a finite number"),
-        (["0,0,0,0,0,0", "x,0,0,0,0,0"], "3: t_s 'x' is not a finite number"),
-        (["1,0,0,0,0,0", "1,0,0,0,0,0"], "3: t_s 1 is not after the line before, 1"),
-        (["0,0,11,0,0,0"], "2: velocity above 10 m/s"),
-        (["0,0,0,0,1.5,0"], "2: jaw 1.5 is not from 0 to 1"),
-        (["0,0,0,0,0,2"], "2: end 2 is neither 0 nor 1"),
+        (["0,0,0,0,0,0"], "2: 6 values, not 8"),
+        (["0,0,nan,0,0,0,0,0"], "2: velocity_y_m_per_s 'nan' is not a finite number"),
+        (["0,0,0,0,0,0,0,0", "x,0,0,0,0,0,0,0"], "3: t_s 'x' is not a finite number"),
+        (["1,0,0,0,0,0,0,0", "1,0,0,0,0,0,0,0"], "3: t_s 1 is not after the line before, 1"),
+        (["0,0,11,0,0,0,0,0"], "2: velocity above 10 m/s"),
+        (["0,0,0,0,1.5,0,0,0"], "2: jaw 1.5 is not from 0 to 1"),
+        (["0,0,0,0,0,-1.5,0,0"], "2: roll -1.5 is not from -1 to 1"),
+        (["0,0,0,0,0,0,2,0"], "2: clutch 2 is neither 0 nor 1"),
+        (["0,0,0,0,0,0,0,2"], "2: end 2 is neither 0 nor 1"),
     ],
 )
 def test_what_is_wrong_with_a_record_is_said_with_its_line(tmp_path, lines, reason):

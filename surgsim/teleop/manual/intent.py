@@ -13,11 +13,15 @@ class Intent:
     Attributes:
         velocity: Wanted velocity of the tip, world frame [m/s].
         jaw: Wanted closing of the jaws, 0 open to 1 closed.
+        roll: Wanted turn of the grip about its axis, over the fastest, -1 to 1; above 0 to the right.
+        clutch: Whether the pedal is pressed that lets the handle go without the instrument.
         end: Whether the operator is done.
     """
 
     velocity: Velocity = (0.0, 0.0, 0.0)
     jaw: float = 0.0
+    roll: float = 0.0
+    clutch: bool = False
     end: bool = False
 
 

@@ -8,7 +8,8 @@ from pathlib import Path
 from surgsim.errors import SurgsimError
 from surgsim.teleop.manual.intent import Intent, Source
 
-HEADER = ("t_s", "velocity_x_m_per_s", "velocity_y_m_per_s", "velocity_z_m_per_s", "jaw", "end")
+_VELOCITY = ("velocity_x_m_per_s", "velocity_y_m_per_s", "velocity_z_m_per_s")
+HEADER = ("t_s", *_VELOCITY, "jaw", "roll", "clutch", "end")
 _FASTEST_M_PER_S = 10.0
 Rows = list[tuple[float, Intent]]
 
@@ -31,8 +32,9 @@ class Recorder:
         """The record as CSV: the header, then a line for every change; numbers read back exactly."""
         lines = [",".join(HEADER)]
         for t_s, intent in self._rows:
-            numbers = (t_s, *intent.velocity, intent.jaw)
-            lines.append(",".join([*(repr(float(number)) for number in numbers), str(int(intent.end))]))
+            numbers = (t_s, *intent.velocity, intent.jaw, intent.roll)
+            pressed = (str(int(state)) for state in (intent.clutch, intent.end))
+            lines.append(",".join([*(repr(float(number)) for number in numbers), *pressed]))
         return "\n".join(lines) + "\n"
 
 
@@ -84,16 +86,20 @@ def _row(fields: Sequence[str], after_s: float) -> tuple[float, Intent]:
     """
     if len(fields) != len(HEADER):
         raise ValueError(f"{len(fields)} values, not {len(HEADER)}")
-    t_s, x, y, z, jaw, end = (_number(name, text) for name, text in zip(HEADER, fields, strict=True))
+    numbers = (_number(name, text) for name, text in zip(HEADER, fields, strict=True))
+    t_s, x, y, z, jaw, roll, clutch, end = numbers
     if not max(abs(x), abs(y), abs(z)) <= _FASTEST_M_PER_S:
         raise ValueError(f"velocity above {_FASTEST_M_PER_S:g} m/s")
     if t_s <= after_s:
         raise ValueError(f"t_s {t_s:g} is not after the line before, {after_s:g}")
     if not 0.0 <= jaw <= 1.0:
         raise ValueError(f"jaw {jaw:g} is not from 0 to 1")
-    if end not in (0.0, 1.0):
-        raise ValueError(f"end {end:g} is neither 0 nor 1")
-    return t_s, Intent(velocity=(x, y, z), jaw=jaw, end=end == 1.0)
+    if not -1.0 <= roll <= 1.0:
+        raise ValueError(f"roll {roll:g} is not from -1 to 1")
+    for name, state in (("clutch", clutch), ("end", end)):
+        if state not in (0.0, 1.0):
+            raise ValueError(f"{name} {state:g} is neither 0 nor 1")
+    return t_s, Intent(velocity=(x, y, z), jaw=jaw, roll=roll, clutch=clutch == 1.0, end=end == 1.0)
 
 
 def _number(name: str, text: str) -> float:
