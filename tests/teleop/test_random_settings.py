@@ -54,6 +54,26 @@ def settings(number):
     )
 
 
+def re_indexed(number):
+    """`settings` with roll, a small scale that changes and so needs the clutch, and for ours a filter."""
+    ours, assignments = settings(number)
+    rng = np.random.default_rng(3000 + number)
+    small, then, at = rng.uniform(0.1, 0.18), rng.uniform(0.1, 0.6), rng.uniform(0.5, 6.0)
+    goal = "{position_m: [0.02, 0.65, -0.08], push: true, dwell_s: 3.0, roll_deg: %.1f}"
+    further = [
+        "task.operator.clutch.use=true",
+        f"task.mapping.scale={small:.3f}",
+        f"task.mapping.scale_changes=[{{at_s: {at:.3f}, scale: {then:.3f}}}]",
+        f"task.mapping.clutch_fade_s={rng.uniform(0.02, 0.3):.3f}",
+        "task.roll.use=true",
+        f"task.goals=[{goal % rng.uniform(-90.0, 90.0)}]",
+        "task.duration_s=8.0",
+    ]
+    if ours:
+        further.append(f"task.tremor_filter.type={('none', 'low_pass', 'bmflc')[number // 2 % 3]}")
+    return ours, (*assignments, *further)
+
+
 def own_works(trace):
     """Work of the rendered force on the handle and of the tip on the wall, and what was exchanged [J]."""
     handle, force = trace.block("handle"), trace.block("master_force")
@@ -63,9 +83,8 @@ def own_works(trace):
     return to_hand.cumsum(), to_wall.cumsum(), np.abs(to_hand).sum() + np.abs(to_wall).sum()
 
 
-def check(number):
+def check(ours, assignments):
     """One setting: the account against the integrals, the verdict, and for ours the bounds of the tank."""
-    ours, assignments = settings(number)
     trace = simulate(load_scenario("teleop_wall_panda", assignments=assignments))
     run, metrics = trace.active(), compute_metrics(trace)
     to_hand, to_wall, exchanged = own_works(run)
@@ -85,14 +104,25 @@ def check(number):
         assert metrics["tank_min_j"] >= FLOOR_J - 5e-5
         assert metrics["acceleration_limit_ratio"] <= 1.0 + 1e-6
         assert metrics["relaxed_ticks"] == 0
-    return ours, told, trace.meta.ending.outcome.name
+    return metrics
 
 
 @pytest.mark.parametrize("number", [0, 1, 4])
 def test_the_verdict_on_a_random_setting_is_that_of_the_integrals(number):
-    check(number)
+    check(*settings(number))
 
 
 @pytest.mark.slow
 def test_two_hundred_random_settings_of_ours_and_a_hundred_of_the_rivals():
-    assert sum(check(number)[0] for number in (*range(200), *range(200, 400, 2))) == 200
+    drawn = [settings(number) for number in (*range(200), *range(200, 400, 2))]
+    assert sum(ours for ours, _ in drawn) == 200
+    for ours, assignments in drawn:
+        check(ours, assignments)
+
+
+@pytest.mark.slow
+def test_random_settings_with_clutch_changing_scale_roll_and_filter():
+    """24 of ours and 20 of the rivals, each of them twice."""
+    for number in (*range(0, 48, 2), *range(1, 41, 2)):
+        metrics = check(*re_indexed(number))
+        assert metrics["clutchings"] >= 1.0
