@@ -53,7 +53,7 @@ class LiveView:
         rows = sampled_rows(len(piece), rate)
         log_signals(self._stream, piece)
         log_poses(self._stream, (self._scene,), self._bodies, piece, rows, goes_on=True)
-        log_points(self._stream, piece, rows)
+        log_points(self._stream, piece, rows, self._scene)
         self._desired.append(piece.block("tip_ref")[rows])
         self._actual.append(piece.block("tip")[rows])
         log_paths(self._stream, np.concatenate(self._desired), np.concatenate(self._actual))
