@@ -278,6 +278,10 @@ class InstrumentConfig(PartConfig):
         """The tip from the shaft's end (3,) [m], z along the shaft; zeros of a straight instrument."""
         return self.tool.p_ST.copy() if self.of_file else np.zeros(3)
 
+    def up_to_shaft_end(self) -> "InstrumentConfig":
+        """The same with its tip at the shaft's end."""
+        return self.model_copy(update={"tip_site": self.shaft_end_site}) if self.p_ST.any() else self
+
     @property
     def tip_from_shaft_m(self) -> tuple[float, float]:
         """How far the tip is beside the shaft's line, and past the shaft's end along it [m]."""
