@@ -17,6 +17,7 @@ from surgsim.control.torque_laws.joint_impedance import JointImpedanceConfig
 from surgsim.control.torque_laws.policy import PolicyLawConfig
 from surgsim.errors import SurgsimError, unknown_name
 from surgsim.models.build import JointLimits
+from surgsim.scenario.arms import ArmsScenario, Experiment
 from surgsim.scenario.schema import Scenario
 
 Array = NDArray[np.float64]
@@ -78,6 +79,34 @@ def with_agent(
         limit_zone_rad=own.limit_zone_rad,
     )
     return scenario.model_copy(update={"controller": controller})
+
+
+def with_agent_at(
+    scenario: Experiment,
+    arm: str | None,
+    action: Action,
+    resolver: str | PartConfig | None,
+    decimation: int,
+) -> Experiment:
+    """`scenario` with an agent as `with_agent`; of several arms it drives one, and the others stay.
+
+    Raises:
+        SurgsimError: As `with_agent`, and if it is not said which of several arms, or there is but one.
+    """
+    if not isinstance(scenario, ArmsScenario):
+        if arm is not None:
+            raise SurgsimError(f"{scenario.name} has one arm: leave out arm, '{arm}'")
+        return with_agent(scenario, action, resolver, decimation)
+    if arm is None:
+        raise SurgsimError(
+            f"{scenario.name} has the arms {', '.join(scenario.names)}: say by arm which one the agent "
+            "drives; the others have their own controllers"
+        )
+    controller = with_agent(scenario.of(arm), action, resolver, decimation).controller
+    arms = tuple(
+        one.model_copy(update={"controller": controller}) if one.name == arm else one for one in scenario.arms
+    )
+    return scenario.model_copy(update={"arms": arms})
 
 
 def action_spec(scenario: Scenario, limits: JointLimits) -> specs.BoundedArray:

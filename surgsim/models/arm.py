@@ -116,7 +116,7 @@ class ArmModel:
     @property
     def is_angled(self) -> bool:
         """Whether the tip is not the shaft's end."""
-        return self._scene.shaft_end_site != self._scene.tip_site
+        return self._scene.is_angled
 
     @cached_property
     def p_TS(self) -> Array:

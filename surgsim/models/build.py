@@ -88,6 +88,11 @@ class Scene:
     prefix: str = ""
 
     @property
+    def is_angled(self) -> bool:
+        """Whether the instrument's tip is not the shaft's end."""
+        return self.shaft_end_site != self.tip_site
+
+    @property
     def parts(self) -> Named:
         """What belongs to the arm, by its own names."""
         return Named(self.model, self.prefix)

@@ -53,8 +53,9 @@ def inside_view(scenario: Experiment, trace: Trace, *, below: str = "") -> rrb.S
         line_grid=not scenario.theatre,
         eye_controls=_eye(eye, middle),
         overrides={
-            f"{scene}/{DESIRED_PATH}": rr.LineStrips3D.from_fields(radii=rr.Radius.ui_points(3.5)),
-            f"{scene}/{ACTUAL_PATH}": rr.LineStrips3D.from_fields(radii=rr.Radius.ui_points(1.5)),
+            f"{scene}/{of}{path}": rr.LineStrips3D.from_fields(radii=rr.Radius.ui_points(points))
+            for of in ([f"{arm}/" for arm in trace.arms] or [""])
+            for path, points in ((DESIRED_PATH, 3.5), (ACTUAL_PATH, 1.5))
         },
     )
 

@@ -49,6 +49,11 @@ class OneArm:
         """MuJoCo's data."""
         return self._setup.plant.data
 
+    @property
+    def due(self) -> bool:
+        """Whether the next tick ends the run whatever the controller does."""
+        return self._arm.over or not self._arm.safe
+
     def begin(self) -> None:
         """Put everything at its start, and ask the task for its first command."""
         setup = self._setup

@@ -70,6 +70,12 @@ class SeveralArms:
         """MuJoCo's data."""
         return self._setup.data
 
+    @property
+    def due(self) -> bool:
+        """Whether the next tick ends the run whatever the controllers do: a limit of any, or all are done."""
+        safe = all(arm.safe for arm in self.arms) and self._watch.look() is None
+        return not safe or all(arm.over for arm in self.arms)
+
     def begin(self) -> None:
         """Put everything at its start, and ask the tasks for their first commands."""
         self._plants.reset([arm.q_start for arm in self._setup.arms.values()])

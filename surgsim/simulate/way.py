@@ -34,6 +34,11 @@ class Way(Protocol):
         """MuJoCo's data."""
         ...
 
+    @property
+    def due(self) -> bool:
+        """Whether the next tick ends the run whatever the controllers do: time is up, or a limit passed."""
+        ...
+
     def begin(self) -> None:
         """Put everything at its start, and ask the tasks for their first commands."""
         ...

@@ -174,8 +174,16 @@ class EnteringTaskConfig(TaskConfig, Protocol):
         period_s: float,
         seed: np.random.SeedSequence,
         trocar: TrocarConfig | None = None,
+        p_ST: Array | None = None,
     ) -> Task:
-        """The task through `trocar`.
+        """The task through `trocar`; what begins at `start` and goes through it is the shaft's end.
+
+        Args:
+            start: Where it begins (3,) [m].
+            period_s: Between two commands [s].
+            seed: Of everything random in it.
+            trocar: The port.
+            p_ST: The tip from the shaft's end in the instrument's frame (3,) [m]; None: it is there.
 
         Raises:
             ValueError: If `start` is not in front of the port.
