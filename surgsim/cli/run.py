@@ -74,7 +74,7 @@ def execute(options: argparse.Namespace) -> int:
     )
     check_parts([scenario])
     operator, record = options.operator, not options.no_record
-    check_recordable(record)
+    check_recordable(record, "--no-record")
     if options.live is not None:
         require("--live needs", *RECORDING)
     name = f"{scenario.controller_name}-seed{scenario.seed}"
