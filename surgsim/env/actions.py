@@ -5,8 +5,8 @@ from typing import Any, Literal, get_args
 
 import numpy as np
 from dm_env import specs
-from numpy.typing import NDArray
 
+from surgsim.array import Array
 from surgsim.catalog import PartConfig
 from surgsim.control.controller import ControllerConfig
 from surgsim.control.resolvers import RESOLVERS
@@ -20,7 +20,6 @@ from surgsim.models.build import JointLimits
 from surgsim.scenario.arms import ArmsScenario, Experiment
 from surgsim.scenario.schema import Scenario
 
-Array = NDArray[np.float64]
 Action = Literal["tip_velocity", "joint_velocity", "torque"]
 AGENT = "agent"
 """Name of the agent's controller and policy in an episode's scenario."""

@@ -10,8 +10,8 @@ from typing import Any
 import gymnasium
 import numpy as np
 from gymnasium import spaces
-from numpy.typing import NDArray
 
+from surgsim.array import Array
 from surgsim.catalog import PartConfig
 from surgsim.env.actions import Action
 from surgsim.env.environment import DECIMATION, EnvironmentState, load
@@ -19,7 +19,6 @@ from surgsim.scenario.arms import ArmsScenario, Experiment
 from surgsim.scenario.load import load_experiment, shipped
 from surgsim.scenario.schema import Scenario
 
-Array = NDArray[np.float64]
 Observation = dict[str, Any]
 
 

@@ -4,8 +4,8 @@ from collections import OrderedDict
 
 import numpy as np
 from dm_env import specs
-from numpy.typing import NDArray
 
+from surgsim.array import Array
 from surgsim.control.policies.observation import observe
 from surgsim.control.rcm import rcm_kinematics
 from surgsim.plant.state import State
@@ -13,7 +13,6 @@ from surgsim.scenario.schema import Scenario
 from surgsim.simulate.setup import Setup
 from surgsim.tasks.base import TipCommand
 
-Array = NDArray[np.float64]
 Observations = OrderedDict[str, Array]
 Specs = OrderedDict[str, specs.BoundedArray]
 

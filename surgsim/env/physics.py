@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from dm_control.rl import control
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from surgsim.control.policies.registry import offering
 from surgsim.env.actions import AGENT, Agent
@@ -19,8 +19,6 @@ from surgsim.simulate.snapshot import Snapshot
 from surgsim.tasks.base import TipCommand
 from surgsim.tasks.command import command_of
 from surgsim.trace.trace import Ending, Trace
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True)

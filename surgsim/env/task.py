@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from dm_control.rl import control
 from dm_env import specs
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from surgsim.env.actions import action_spec
 from surgsim.env.observations import Observations, Specs, observation_of, observation_spec
@@ -14,8 +14,6 @@ from surgsim.env.physics import SurgsimPhysics
 from surgsim.env.rewards import reward
 from surgsim.errors import Outcome
 from surgsim.trace.trace import Ending, Trace
-
-Array = NDArray[np.float64]
 
 
 class ScenarioTask(control.Task):

@@ -5,8 +5,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from surgsim.array import Array
 from surgsim.compare.leaderboard import leaderboard
 from surgsim.compare.observations import Observations, metric_named
 from surgsim.errors import SurgsimError
@@ -27,7 +27,6 @@ from surgsim.recording.polyline import drawn_rows
 
 __all__ = ["SUFFIXES", "write_figure"]
 
-Array = NDArray[np.float64]
 
 _MM = 1e3
 _ERRORS = (

@@ -12,6 +12,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from surgsim.array import Array
 from surgsim.models.adopted.capsules import capsules_in
 from surgsim.models.adopted.collisions import ADAPTER_M, ADAPTER_RADIUS_M
 from surgsim.models.adopted.touching import NEXT_THAT_CAN_TOUCH
@@ -21,7 +22,6 @@ from surgsim.models.named import Named
 from surgsim.models.robot import joint_names, link_names
 from surgsim.models.theatre import patient_place
 
-Array = NDArray[np.float64]
 Ids = NDArray[np.intp]
 NEVER_TOUCH = "never_touch"
 BENT_PART = "bent part"

@@ -21,6 +21,7 @@ from pydantic import (
 )
 from pydantic_core import PydanticCustomError
 
+from surgsim.array import Array
 from surgsim.catalog import PartConfig
 from surgsim.errors import SurgsimError
 from surgsim.models.adopted.arm import adopted
@@ -38,7 +39,6 @@ from surgsim.models.instrument_files import (
     known_instrument,
     shipped_instruments,
 )
-from surgsim.spatial import Array
 
 
 @dataclass(frozen=True)

@@ -5,8 +5,8 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
+from surgsim.array import Array
 from surgsim.compiled import compiled
 from surgsim.models.build import Scene
 from surgsim.plant.truth import Contact
@@ -18,7 +18,6 @@ from surgsim.tick.views import doubles, vector, words
 if TYPE_CHECKING:
     from surgsim.plant.between import Between
 
-Array = NDArray[np.float64]
 
 SKIN_MARGIN_M = 0.1
 """How far from the port the shaft may pass the skin; nearer is the RCM limit's matter."""

@@ -5,8 +5,8 @@ from typing import Literal
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
+from surgsim.array import Array
 from surgsim.catalog import PartConfig
 from surgsim.columns import Block
 from surgsim.compiled import address_of, as_parameter, compiled
@@ -24,8 +24,6 @@ from surgsim.tick.arrays import World, new
 from surgsim.tick.mujoco_calls import mj_kinematics
 from surgsim.tick.status import GOES_ON
 from surgsim.tick.views import vector
-
-Array = NDArray[np.float64]
 
 
 class KinematicPlantConfig(PartConfig):

@@ -21,10 +21,11 @@ from typing import ClassVar
 import mujoco
 import numpy as np
 
+from surgsim.array import Array
 from surgsim.compiled import compiled
 from surgsim.models.build import Scene
 from surgsim.plant.bore import Bore, Push
-from surgsim.tick.arrays import Array, Record, World
+from surgsim.tick.arrays import Record, World
 from surgsim.tick.mujoco_calls import mj_mulM
 from surgsim.tick.overlay import laid_over, overlay
 from surgsim.tick.python_part import PythonPart, enter

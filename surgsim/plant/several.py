@@ -7,8 +7,8 @@ from typing import Any, ClassVar
 import mujoco
 import numpy as np
 from numba import types
-from numpy.typing import NDArray
 
+from surgsim.array import Array
 from surgsim.compiled import address_of, as_parameter, call_at, compiled
 from surgsim.errors import SurgsimError
 from surgsim.plant.dynamic import DynamicPlant
@@ -29,7 +29,6 @@ from surgsim.tick.mujoco_calls import mj_step1, mj_step2
 from surgsim.tick.status import GOES_ON
 from surgsim.tick.views import place_of, record_at, words
 
-Array = NDArray[np.float64]
 _ENTRY = 4
 
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import rerun as rr
 
+from surgsim.array import Array
 from surgsim.errors import SurgsimError
 from surgsim.recording.below import by_arm
 from surgsim.recording.blueprint import blueprint
@@ -17,7 +18,7 @@ from surgsim.recording.signals import log_signals
 from surgsim.recording.view import display
 from surgsim.recording.write import log_texts, recording_name
 from surgsim.scenario.arms import Experiment
-from surgsim.trace.trace import Array, Trace
+from surgsim.trace.trace import Trace
 
 _LAID_OUT_AFTER_S = 0.5
 _CONNECT_S = 5.0

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import rerun.blueprint as rrb
 
+from surgsim.array import Array
 from surgsim.recording.below import Below, by_arm
 from surgsim.recording.blueprint import laid_out, texts_view
 from surgsim.recording.eyes import inside_view, scene_view
@@ -16,7 +17,7 @@ from surgsim.recording.scene import log_scene, scenario_of
 from surgsim.recording.signals import log_signals
 from surgsim.recording.stream import stream_to
 from surgsim.recording.write import log_texts
-from surgsim.trace.trace import Array, Trace
+from surgsim.trace.trace import Trace
 
 _SIDES = ("a", "b")
 _MARGIN = 0.05  # above and below the signals, as a share of their range

@@ -7,6 +7,7 @@ import mujoco
 import numpy as np
 import rerun as rr
 
+from surgsim.array import Array
 from surgsim.models.build import Scene, SharedArm, SpecModifier, build, build_shared
 from surgsim.recording import palette
 from surgsim.recording.layout import SCENE, TIMELINE, timestamps
@@ -15,7 +16,7 @@ from surgsim.recording.shapes import Triangles, geom_triangles, joined
 from surgsim.scenario.arms import ArmsScenario, Experiment, each_arm, experiment_of
 from surgsim.scenario.schema import Scenario
 from surgsim.spatial import nearest_on_line
-from surgsim.trace.trace import Array, Trace
+from surgsim.trace.trace import Trace
 
 RCM_ARROW_SCALE = 20.0
 DESIRED_PATH, ACTUAL_PATH = "desired_path", "actual_path"

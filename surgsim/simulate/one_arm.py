@@ -2,10 +2,11 @@
 
 import mujoco
 
+from surgsim.array import Array
 from surgsim.compiled import as_parameter
 from surgsim.errors import Outcome
 from surgsim.scenario.schema import Scenario
-from surgsim.simulate.arm_run import ArmRun, Array, stop_ticks_of, ticks_of
+from surgsim.simulate.arm_run import ArmRun, stop_ticks_of, ticks_of
 from surgsim.simulate.setup import Setup
 from surgsim.simulate.ticks import (
     GOING,

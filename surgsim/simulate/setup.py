@@ -6,8 +6,8 @@ from typing import TypeGuard
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
+from surgsim.array import Array
 from surgsim.control.controller import Controller
 from surgsim.errors import SurgsimError, UnreachableError
 from surgsim.models.arm import ArmModel
@@ -19,7 +19,6 @@ from surgsim.simulate.reach import Reach
 from surgsim.simulate.start import Places, check_path, check_through_port, solve_start
 from surgsim.tasks.base import EnteringTaskConfig, Task, TaskConfig, WeighsForce
 
-Array = NDArray[np.float64]
 MOST_TICKS = 4_000_000
 MOST_STEPS = 200_000_000
 

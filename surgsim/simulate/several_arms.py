@@ -7,13 +7,14 @@ from typing import Any, TypeVar
 import mujoco
 import numpy as np
 
+from surgsim.array import Array
 from surgsim.columns import of_arm
 from surgsim.compiled import address_of, as_parameter
 from surgsim.errors import Outcome
 from surgsim.plant.between import Between
 from surgsim.plant.several import SeveralPlants, Shared
 from surgsim.scenario.arms import ArmsScenario
-from surgsim.simulate.arm_run import ArmRun, Array, stop_ticks_of, ticks_of
+from surgsim.simulate.arm_run import ArmRun, stop_ticks_of, ticks_of
 from surgsim.simulate.arms_setup import ArmsSetup
 from surgsim.simulate.arms_ticks import (
     ENTRY,

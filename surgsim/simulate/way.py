@@ -4,8 +4,9 @@ from typing import Protocol
 
 import mujoco
 
+from surgsim.array import Array
 from surgsim.scenario.arms import Experiment
-from surgsim.simulate.arm_run import ArmRun, Array
+from surgsim.simulate.arm_run import ArmRun
 from surgsim.tick.arrays import Record
 from surgsim.trace.trace import Ending, Trace
 

@@ -7,9 +7,9 @@ from typing import Annotated, Any, ClassVar, Protocol, Self, runtime_checkable
 
 import numpy as np
 from numba.extending import is_jitted
-from numpy.typing import NDArray
 from pydantic import Field, NonNegativeFloat, PositiveFloat, model_validator
 
+from surgsim.array import Array
 from surgsim.catalog import PartConfig, Surroundings
 from surgsim.columns import Block
 from surgsim.compiled import compiled
@@ -23,7 +23,6 @@ from surgsim.tick.blank import new_command, new_feedback
 from surgsim.tick.scratch import scratch_matrix
 from surgsim.tick.status import GOES_ON
 
-Array = NDArray[np.float64]
 _REACH_SAMPLES = 200
 
 

@@ -14,12 +14,13 @@ from typing import Annotated, ClassVar, Literal, Self
 import numpy as np
 from pydantic import Field, NonNegativeFloat, PositiveFloat, model_validator
 
+from surgsim.array import Array
 from surgsim.catalog import PartConfig
 from surgsim.columns import scalar
 from surgsim.compiled import compiled
 from surgsim.models.config import TrocarConfig, Vec3
 from surgsim.spatial import unit
-from surgsim.tasks.base import Array, Feedback, TipCommand
+from surgsim.tasks.base import Feedback, TipCommand
 from surgsim.tasks.profile import progress
 from surgsim.tasks.success import PATH_NEEDS, RunColumns, Success
 from surgsim.tick import arrays

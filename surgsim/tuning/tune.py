@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from surgsim.array import Array
 from surgsim.errors import ScenarioError
 from surgsim.scenario.arms import Experiment
 from surgsim.scenario.load import load_experiment
@@ -18,7 +18,6 @@ from surgsim.tuning.search import minimise
 from surgsim.tuning.trials import Case, Report, RunJobs, Trials
 from surgsim.tuning.tuning import Candidate, Tuning
 
-Array = NDArray[np.float64]
 EVALUATIONS = "evaluations.jsonl"
 
 

@@ -3,8 +3,8 @@
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from surgsim.array import Array
 from surgsim.teleop.console import ConsoleState
 from surgsim.teleop.hand import HandCommand
 from surgsim.teleop.impedance import Grip, hand_wrench
@@ -14,7 +14,6 @@ from surgsim.teleop.operator import OperatorConfig
 from surgsim.tick.arrays import new
 from surgsim.tick.overlay import take
 
-Array = NDArray[np.float64]
 EASE_S = 0.05
 LEAD_M = 0.05
 
