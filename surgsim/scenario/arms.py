@@ -57,7 +57,7 @@ _SEEDS = 3
 _EACH = "give it to each of the arms, as arms.0."
 NOT_BESIDE_ARMS = {
     **{key: f"{_EACH}{key}" for key in ("robot", "instrument", "trocar", "start", "task", "controller")},
-    "props": "what an arm grasps or touches is for one arm alone",
+    "props": "what an arm grasps or touches is for one arm alone; leave it out, or run one arm",
 }
 """Keys of a scenario of one arm that one of several does not have, and why."""
 
