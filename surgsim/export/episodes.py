@@ -168,7 +168,10 @@ def runs_of(subjects: Sequence[Subject]) -> list[RunSubject]:
             raise SurgsimError("episodes are of runs and batches, not of a study")
     for run in found:
         if run.arm or run.arms:
-            raise SurgsimError(f"{run.path}: a run of several arms; episodes are of runs of one")
+            raise SurgsimError(
+                f"{run.path}: a run of several arms; episodes are of runs of one; "
+                "--data FILE takes all columns"
+            )
     return found
 
 

@@ -48,7 +48,8 @@ class SeveralArms:
     def __init__(self, setup: ArmsSetup) -> None:
         self._setup = setup
         each = setup.arms
-        self.stop_ticks = max(stop_ticks_of(arm) for arm in each.values())
+        held = [stop_ticks_of(arm) for arm in each.values() if arm.scenario.plant.uses_torque]
+        self.stop_ticks = max(held, default=0)
         most = max(ticks_of(arm) for arm in each.values()) + 1 + self.stop_ticks
         self._by_name = {name: ArmRun(arm, most) for name, arm in each.items()}
         self.arms = tuple(self._by_name.values())
