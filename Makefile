@@ -16,7 +16,8 @@ INSTALLED := $(VENV)/.surgsim-$(STATE)
 INSTALLED_DEV := $(VENV)/.surgsim-dev-$(STATE)
 INSTALLED_DOCS := $(VENV)/.surgsim-docs-$(STATE)
 INSTALLED_ALL := $(VENV)/.surgsim-all-$(STATE)
-PIP_INSTALL := "$(PY)" -m pip install --disable-pip-version-check -c "$(ROOT)/constraints.txt"
+# Python compiles a module when it is first imported; pip would compile all of them, which takes as long as the rest.
+PIP_INSTALL := "$(PY)" -m pip install --disable-pip-version-check --no-compile -c "$(ROOT)/constraints.txt"
 # pip says nothing while it unpacks: every ten seconds a line tells how much is there.
 ALIVE := began=$$(date +%s); { while sleep 10 > /dev/null 2>&1; do printf '  installing for %s s, %s MB so far\n' "$$(($$(date +%s) - began))" "$$(du -sm '$(VENV)' | cut -f1)" >&2; done; } & trap "kill $$! 2> /dev/null" EXIT;
 OLD_ENOUGH := import sys; v = sys.version_info; sys.exit(0 if v >= (3, 11) else "surgsim needs Python 3.11 or newer; %s is %d.%d. Set PYTHON=/path/to/python3.11" % (sys.executable, v[0], v[1]))

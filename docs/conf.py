@@ -60,6 +60,7 @@ extensions = [
     "mathml",
     "repository_files",
     "from_code",
+    "recorded_run",
 ]
 myst_enable_extensions = ["dollarmath"]
 myst_heading_anchors = 4

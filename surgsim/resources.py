@@ -10,7 +10,10 @@ _PACKAGE = Path(__file__).resolve().parent
 
 
 def resource_dir(name: str) -> Path:
-    """Folder `name` (`assets` or `scenarios`): inside the wheel, else at the checkout's top level."""
+    """Folder `name` (`assets`, `scenarios`, `examples`): inside the wheel, else at the checkout's top level.
+
+    Of the examples the wheel has the reader of external controllers alone.
+    """
     packed = _PACKAGE / "_data" / name
     return packed if packed.is_dir() else _PACKAGE.parent / name
 

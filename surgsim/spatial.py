@@ -3,11 +3,9 @@
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from surgsim.array import Array
 from surgsim.compiled import compiled
-
-Array = NDArray[np.float64]
 
 
 def cross(a: Array, b: Array) -> Array:

@@ -10,6 +10,7 @@ import surgsim
 # Lowest first. A module belongs to its longest matching prefix and never imports from a higher layer.
 LAYERS = (
     "surgsim",
+    "surgsim.array",
     "surgsim.errors",
     "surgsim.packages",
     "surgsim.resources",

@@ -1,15 +1,24 @@
 """The documentation site builds without a warning, its links lead somewhere, and it asks no other host."""
 
 import re
+import shutil
 import subprocess
 import sys
+import threading
+from functools import partial
 from html.parser import HTMLParser
+from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 from urllib.parse import unquote
 
+import left_out
 import pytest
+from playwright import sync_api as playwright
+
+import surgsim
 
 ROOT = Path(__file__).resolve().parents[1]
+ARGUMENTS = ["--no-sandbox", "--disable-gpu", "--disable-background-networking"]
 LOADS = {"script": "src", "img": "src", "link": "href", "iframe": "src", "source": "src"}
 
 
@@ -28,6 +37,13 @@ class Page(HTMLParser):
             self.links.append(found["href"])
         if found.get(LOADS.get(tag, "")):
             self.loads.append(found[LOADS[tag]])
+
+
+class Quiet(SimpleHTTPRequestHandler):
+    """Serves files and says nothing."""
+
+    def log_message(self, *_):
+        pass
 
 
 def outside(target):
@@ -108,3 +124,41 @@ def test_a_page_is_read_without_scripts(site):
     assert "MathJax" not in text
     assert "rcm_error_rms_mm" in (site / "docs" / "reference" / "metrics.html").read_text(encoding="utf-8")
     assert "--controllers" in (site / "docs" / "reference" / "commands.html").read_text(encoding="utf-8")
+
+
+@pytest.mark.needs("sphinx")
+def test_a_recorded_run_is_there_with_the_viewer_that_asks_no_other_host(site, pages):
+    folder = site / "docs" / "recorded_run"
+    assert folder / "index.html" in pages
+    assert 'href="recorded_run/index.html"' in (site / "docs" / "gallery.html").read_text(encoding="utf-8")
+    page = (folder / "index.html").read_text(encoding="utf-8")
+    assert "connect-src 'self' blob: data:" in page
+    assert 'new URL("recording.rrd"' in page
+    assert (folder / "re_viewer_bg.wasm").read_bytes()[:4] == b"\0asm"
+    assert surgsim.read(folder / "recording.rrd").outcome == "completed"
+
+
+@pytest.mark.needs("sphinx")
+@pytest.mark.needs("chromium")
+def test_the_gallery_opens_the_recording_and_no_other_host_is_asked(site):
+    handler = partial(Quiet, directory=str(site))
+    server = ThreadingHTTPServer(("127.0.0.1", 0), handler)
+    host = f"127.0.0.1:{server.server_address[1]}"
+    threading.Thread(target=server.serve_forever, daemon=True).start()
+    asked = set()
+    try:
+        with playwright.sync_playwright() as runner:
+            chromium = next(filter(None, map(shutil.which, left_out.BROWSERS)))
+            browser = runner.chromium.launch(executable_path=chromium, args=ARGUMENTS)
+            page = browser.new_page()
+            page.on("request", lambda request: asked.add(request.url))
+            page.goto(f"http://{host}/docs/gallery.html")
+            with page.expect_request(
+                lambda request: request.url.endswith("/re_viewer_bg.wasm"), timeout=100_000
+            ):
+                page.click(".recorded-run a")
+            browser.close()
+    finally:
+        server.shutdown()
+        server.server_close()
+    assert {address.split("/")[2] for address in asked if address.startswith("http")} == {host}

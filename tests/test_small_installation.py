@@ -13,6 +13,7 @@ from batches import short_run
 
 import surgsim
 import surgsim.env
+from surgsim.bench.sections import bench_of
 from surgsim.cli.main import main
 from surgsim.packages import PACKAGES, MissingPackageError, lacking, missing
 
@@ -215,6 +216,41 @@ def test_what_draws(words, line, without, tmp_path, monkeypatch, capsys):
     assert capsys.readouterr().err.endswith(f"surgsim: {line}\n")
 
 
+def test_the_leaderboard_is_refused_before_its_first_run(without, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    without("mink")
+    assert main(["score", "--all"]) == 2
+    assert capsys.readouterr().err == (
+        "surgsim: not every entry of surgsim_v1 can be run here: nominal/mink, velocity_level/mink: "
+        "the resolver 'mink' needs mink: pip install surgsim; "
+        "--track port_tracked or instrument_tracked or teleoperation can be run\n"
+    )
+    assert main(["score", "--all", "--track", "nominal"]) == 2
+    assert capsys.readouterr().err == (
+        "surgsim: not every entry of surgsim_v1 can be run here: nominal/mink: "
+        "the resolver 'mink' needs mink: pip install surgsim\n"
+    )
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_measurement_of_speed_leaves_out_what_it_cannot_run(without, capsys):
+    without("mink", "rerun")
+    line = "the resolver 'mink' needs mink: pip install surgsim"
+    bench = bench_of(None, None, 10.0, 1)
+    startup = "startup, its recording: recordings need rerun-sdk: pip install surgsim"
+    assert bench.left_out == (f"circle/mink: {line}", startup)
+    assert "circle/mink" not in [case.name for case in bench.cases]
+    assert main(["bench", "--only", "ticks", "--cases", "circle/pinv,circle/mink"]) == 2
+    assert capsys.readouterr().err == f"surgsim: circle/mink: {line}\n"
+
+
+def test_a_start_is_measured_without_its_recording(small):
+    done = small("bench", "--only", "startup", "--json")
+    assert done.stderr.startswith("surgsim: left out: startup, its recording: recordings need rerun-sdk: pip")
+    assert '"run"' in done.stdout
+    assert '"recording"' not in done.stdout
+
+
 def test_python_says_the_same(without, monkeypatch):
     task = {"duration_s": 0.2, "ramp_s": 0.1, "hold_start_s": 0.0, "hold_end_s": 0.0}
     run = surgsim.run("circle_lwr4plus", task=task, theatre=False)
@@ -223,7 +259,8 @@ def test_python_says_the_same(without, monkeypatch):
         run.figure()
     with pytest.raises(MissingPackageError, match=r"^learning environments need dm-control: pip install"):
         surgsim.env.load  # noqa: B018
-    with pytest.raises(MissingPackageError, match=r"^recordings need rerun-sdk: pip install surgsim, or"):
+    instead = r"^recordings need rerun-sdk: pip install surgsim, or record=False$"
+    with pytest.raises(MissingPackageError, match=instead):
         surgsim.run("circle_lwr4plus", out="x")
 
 

@@ -140,7 +140,7 @@ def test_an_insertion_is_done_at_depth():
     short = {"insertion_depth_m": 0.03, "insertion_phase": 1.0}
     found = verdict(run("insertion_lwr4plus", short, extra=extra))
     assert found.success is False
-    assert found.reason.startswith("the tip came to 30.0 mm of ")
+    assert found.reason.startswith("the shaft came to 30.0 mm of ")
     inside = {"insertion_depth_m": 0.1, "insertion_phase": 2.0}
     found = verdict(run("insertion_lwr4plus", inside, extra=extra))
     assert (found.success, found.reason) == (True, "the instrument is inserted")

@@ -106,6 +106,16 @@ _HEAD = """# Gallery
 
 Every scenario that comes with surgsim, with the command that runs it. `surgsim inspect` shows a run's
 figures, and with `--view` the run itself.
+
+## A recording in the viewer
+
+Every recorded run can be looked at from all sides, and at every moment. The site (`make docs`) holds this one
+and the viewer. Serve the site by `python -m http.server --directory build/site`: no browser starts the viewer
+from a file.
+
+![The recording of the circle in the viewer](images/recording.png)
+
+<!-- recording in the viewer -->
 """
 
 

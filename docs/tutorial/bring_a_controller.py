@@ -11,7 +11,7 @@
 # trocar:
 
 # %%
-import shutil
+import subprocess
 import sys
 from pathlib import Path
 
@@ -30,16 +30,16 @@ for controller in ("pinv", stiffer):
 # ## A program of your own
 #
 # A program in any language can be the controller. surgsim asks it once every control tick and waits for its
-# answer. In Python that takes one function; the reader of the messages is a file of the examples, which is
-# copied beside it.
+# answer. In Python that takes one function. The reader of the messages and their layout are printed by the
+# command `surgsim external`, and stand beside it.
 #
 # This one is a spring and a damper in each joint. They pull the joints to the reference that surgsim
 # computes from the path. surgsim adds the torques of gravity.
 
 # %%
-examples = Path(surgsim.__file__).parents[1] / "examples" / "external" / "python"
-for file in ("surgsim_external.py", "layout.json"):
-    shutil.copy(examples / file, file)
+for kind, file in (("python", "surgsim_external.py"), ("layout", "layout.json")):
+    printed = subprocess.check_output([sys.executable, "-m", "surgsim", "external", kind])
+    Path(file).write_bytes(printed)
 Path("my_controller.py").write_text(
     """
 from surgsim_external import serve

@@ -6,13 +6,13 @@ from typing import Any
 
 import numpy as np
 
+from surgsim.array import Array
 from surgsim.errors import SurgsimError
 from surgsim.models.arm import ArmModel
 from surgsim.models.config import RobotConfig
 from surgsim.scenario.load import load_scenario
 from surgsim.scenario.schema import Scenario
 from surgsim.simulate.setup import beginning
-from surgsim.spatial import Array
 
 RADIUS_M, DEPTH_M = 0.02, 0.15
 """Of the circle that is followed through each port."""

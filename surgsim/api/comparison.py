@@ -13,9 +13,10 @@ import numpy as np
 
 from surgsim.api.leaderboard import Leaderboard
 from surgsim.api.run import Run, read_run
+from surgsim.array import Array
 from surgsim.compare.columns import Table
 from surgsim.compare.leaderboard import leaderboard
-from surgsim.compare.observations import Array, Observations
+from surgsim.compare.observations import Observations
 from surgsim.compare.summary import summary
 from surgsim.compare.table import read_table, schema
 from surgsim.display import WIDTH, count, html_table, html_title, number, text_table

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
+from surgsim.array import Array
 from surgsim.columns import AXES
 from surgsim.display import number
 from surgsim.studies.figure import BLACK, BLUE, ORANGE, VERMILLION
@@ -16,7 +16,6 @@ from surgsim.trace.trace import Trace
 if TYPE_CHECKING:
     from surgsim.api.run import Run
 
-Array = NDArray[np.float64]
 
 _MM = 1e3
 _NEAR = 0.5

@@ -4,7 +4,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from surgsim.errors import SurgsimError, unknown_name
-from surgsim.scenario.arms import Experiment
+from surgsim.runs.parts import missing_package
+from surgsim.scenario.arms import Experiment, each_arm
 from surgsim.scenario.load import load_experiment, load_scenario, shipped
 from surgsim.scenario.schema import Scenario
 
@@ -48,6 +49,11 @@ class Case:
     def experiment(self) -> Experiment:
         """The scenario, of one arm or of several."""
         return load_experiment(self.source, controller=self.controller, assignments=self.settings)
+
+    def lacks(self) -> str:
+        """The line about a package that its controller needs and that is not installed, or nothing."""
+        lines = [missing_package(one.controller) for one in each_arm(self.experiment())]
+        return next(filter(None, lines), "")
 
     @property
     def has_stages(self) -> bool:

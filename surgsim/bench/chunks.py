@@ -3,12 +3,10 @@
 from collections.abc import Callable, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from surgsim.array import Array
 from surgsim.compiled.watch import thread_time_ns
 from surgsim.plant.part import BLOCK_TICKS
-
-Array = NDArray[np.float64]
 
 CHUNK = BLOCK_TICKS
 """Ticks of a chunk: as many as a run enters its loop for, some milliseconds, so that neighbours in time see

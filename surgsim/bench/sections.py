@@ -9,6 +9,7 @@ from typing import Any
 
 from surgsim.bench.cases import Case, chosen
 from surgsim.errors import SurgsimError, unknown_name
+from surgsim.packages import RECORDING, MissingPackageError, lacking
 
 Row = dict[str, Any]
 Report = Callable[[str], None]
@@ -29,22 +30,25 @@ class Bench:
         cases: Of ticks and stages.
         duration_s: Simulated time of a run [s].
         repeat: How often: runs of a case, processes of a start, batches.
+        left_out: A line for each case or part that is not measured, for a package that is not installed.
     """
 
     sections: tuple[str, ...]
     cases: tuple[Case, ...]
     duration_s: float
     repeat: int
+    left_out: tuple[str, ...] = ()
 
 
 def bench_of(
     only: Sequence[str] | None, cases: Sequence[str] | None, duration_s: float, repeat: int
 ) -> Bench:
-    """A checked measurement; None stands for all.
+    """A checked measurement; None stands for all that can be measured here.
 
     Raises:
         SurgsimError: If a section or case is not known, the duration is not from 3 s to an hour, or the
             count is not positive.
+        MissingPackageError: If a case that is named needs a package which is not installed.
     """
     for name in only or ():
         if name not in SECTIONS:
@@ -55,7 +59,21 @@ def bench_of(
             "and at least one repeat"
         )
     sections = tuple(name for name in SECTIONS if only is None or name in only)
-    return Bench(sections=sections, cases=tuple(chosen(cases)), duration_s=duration_s, repeat=repeat)
+    wanted = chosen(cases)
+    measured = wanted if {"ticks", "stages"} & set(sections) else []
+    lacks = {case.name: line for case in measured if (line := case.lacks())}
+    left_out = [f"{name}: {line}" for name, line in lacks.items()]
+    if cases is not None and left_out:
+        raise MissingPackageError("; ".join(left_out))
+    if "startup" in sections and (line := lacking("recordings need", *RECORDING)):
+        left_out.append(f"startup, its recording: {line}")
+    return Bench(
+        sections=sections,
+        cases=tuple(case for case in wanted if case.name not in lacks),
+        duration_s=duration_s,
+        repeat=repeat,
+        left_out=tuple(left_out),
+    )
 
 
 def measure(bench: Bench, report: Report) -> Iterator[tuple[str, list[Row]]]:

@@ -80,11 +80,14 @@ def execute(options: argparse.Namespace) -> int:
 
     from surgsim.bench.kept import against, keep, read_kept
     from surgsim.bench.sections import bench_of, machine, measure
+    from surgsim.cli.table import print_prose
     from surgsim.errors import SurgsimError
 
     bench = bench_of(_names(options.only), _names(options.cases), options.duration, options.repeat)
     if (options.against or options.keep) and "ticks" not in bench.sections:
         raise SurgsimError("bench: --against and --keep are for the section ticks, which --only leaves out")
+    if bench.left_out:
+        print_prose(f"surgsim: left out: {'; '.join(bench.left_out)}", sys.stderr)
     kept = None if options.against is None else read_kept(options.against)
     found: dict[str, Any] = {"machine": machine()}
     with _progress() as report:

@@ -37,8 +37,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--run", action="append", default=[], metavar="RUN_ID", help="a run of the batch")
     _add_files(parser, "--data", "FILE.mat|.npz|.parquet", "every tick of a run, every run of a batch")
     _add_files(parser, "--table", "FILE.tex|.md|.csv", "controllers of a batch, or runs, with their metrics")
-    _add_files(parser, "--figure", "FILE.pdf|.svg|.png", "errors of runs over time, controllers of a batch")
-    parser.add_argument("--metric", default="", metavar="A,B", help="metrics of table and figure")
+    _add_files(
+        parser,
+        "--figure",
+        "FILE.pdf|.svg|.png",
+        "errors of runs over time, controllers of a batch, rows of a study",
+    )
+    parser.add_argument(
+        "--metric", default="", metavar="A,B", help="metrics of table and figure; of a study columns"
+    )
     parser.add_argument(
         "--width", choices=("column", "page"), default="column", help="of a figure: 3.5 or 7.2 inch"
     )
@@ -139,7 +146,12 @@ def _jobs(options: argparse.Namespace) -> list[Job]:
     for path in options.figure:
         check_target("--figure", path, figure.SUFFIXES, force=options.force)
         jobs.append(
-            (path, lambda path, subjects: figure.write_figure(path, subjects, metrics, options.width))
+            (
+                path,
+                lambda path, subjects: figure.write_figure(
+                    path, subjects, metrics, options.width, options.study_table
+                ),
+            )
         )
     for path in options.video:
         jobs.append((path, _video_job(path, options)))

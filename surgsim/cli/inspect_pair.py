@@ -4,13 +4,15 @@ import argparse
 import json
 import math
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from surgsim.recording.read import Recorded
     from surgsim.trace.trace import Trace
+
+    Values = Mapping[str, float | None]
 
 _LONGEST_VALUE = 40
 _KINDS = ("type", "name")
@@ -20,7 +22,7 @@ def inspect_two(paths: list[Path], options: argparse.Namespace) -> int:
     """Print how two recorded runs differ, and write or show both on one timeline if that is asked for.
 
     Raises:
-        SurgsimError: If one is not recorded, or the disk refuses.
+        SurgsimError: If one is not recorded, the two have other arms, or the disk refuses.
     """
     from surgsim.cli.table import print_prose
     from surgsim.errors import SurgsimError
@@ -31,9 +33,12 @@ def inspect_two(paths: list[Path], options: argparse.Namespace) -> int:
     if options.export:
         raise SurgsimError("--export takes one recording")
     pair = [read_recording(path) for path in paths]
-    for path, recorded in zip(paths, pair, strict=True):
-        if recorded.trace.arms:
-            raise SurgsimError(f"{path}: a run of several arms; two runs side by side are of one arm each")
+    one, other = (_named_arms(recorded.trace.arms) for recorded in pair)
+    if one != other:
+        raise SurgsimError(
+            f"{paths[0]} is a run of {one}, {paths[1]} of {other}: two runs side by side have the same arms; "
+            "inspect each by itself"
+        )
     _print_pair(paths, pair, as_json=options.json)
     if not (options.view or options.web or options.out):
         return 0
@@ -50,11 +55,10 @@ def inspect_two(paths: list[Path], options: argparse.Namespace) -> int:
 
 def _print_pair(paths: list[Path], pair: "list[Recorded]", as_json: bool) -> None:
     from surgsim.cli.table import print_prose, print_table
-    from surgsim.display import number
-    from surgsim.metrics.catalog import METRICS, compute_metrics
+    from surgsim.metrics.catalog import compute_metrics, of_one_arm
 
     a, b = (compute_metrics(recorded.trace) for recorded in pair)
-    gaps = {name: _minus(b[name], a[name]) for name in METRICS}
+    gaps = {name: _minus(b[name], a[name]) for name in a}
     scenarios = [recorded.trace.meta.scenario for recorded in pair]
     changed = list(differing(scenarios[0], scenarios[1]))
     if as_json:
@@ -70,11 +74,32 @@ def _print_pair(paths: list[Path], pair: "list[Recorded]", as_json: bool) -> Non
     else:
         print("The scenarios are the same.")
     print()
-    shown = [name for name in METRICS if a[name] is not None or b[name] is not None]
+    one, other = (recorded.trace for recorded in pair)
+    if not one.arms:
+        _print_metrics("", a, b, gaps, one, other)
+    for arm in one.arms:
+        first, second, minus = (of_one_arm(values, arm) for values in (a, b, gaps))
+        _print_metrics(arm, first, second, minus, one.of(arm), other.of(arm))
+
+
+def _print_metrics(arm: str, a: "Values", b: "Values", gaps: "Values", one: "Trace", other: "Trace") -> None:
+    """Metrics of an arm in both runs, and how far apart its tips were; no name where it is alone."""
+    from surgsim.cli.table import print_table
+    from surgsim.display import number
+
+    shown = [name for name in a if a[name] is not None or b[name] is not None]
     table = [(name, *(number(values[name]) for values in (a, b, gaps))) for name in shown]
-    print_table("Metrics", ("metric", "a", "b", "b - a"), table, right=(1, 2, 3))
-    largest = number(largest_gap_mm(pair[0].trace, pair[1].trace))
-    print(f"\nlargest distance between the two tips: {largest} mm")
+    of = f" of {arm}" if arm else ""
+    print_table(f"Metrics{of}", ("metric", "a", "b", "b - a"), table, right=(1, 2, 3))
+    largest = number(largest_gap_mm(one, other))
+    print(f"\nlargest distance between the two tips{of}: {largest} mm")
+    if arm:
+        print()
+
+
+def _named_arms(arms: Sequence[str]) -> str:
+    """The arms of a run in words."""
+    return f"arms {' and '.join(arms)}" if arms else "one arm"
 
 
 def differing(a: Any, b: Any, path: str = "") -> Iterator[tuple[str, Any, Any]]:

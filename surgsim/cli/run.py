@@ -74,7 +74,7 @@ def execute(options: argparse.Namespace) -> int:
     )
     check_parts([scenario])
     operator, record = options.operator, not options.no_record
-    check_recordable(record)
+    check_recordable(record, "--no-record")
     if options.live is not None:
         require("--live needs", *RECORDING)
     name = f"{scenario.controller_name}-seed{scenario.seed}"
@@ -86,7 +86,7 @@ def execute(options: argparse.Namespace) -> int:
 
                 realtime = options.pace == "realtime"
                 result = run_shown(
-                    _of_one_arm(scenario, "--live"),
+                    scenario,
                     folder,
                     options.live or None,
                     realtime=realtime,
@@ -98,9 +98,7 @@ def execute(options: argparse.Namespace) -> int:
             else:
                 from surgsim.live.operate import operate
 
-                result = operate(
-                    _of_one_arm(scenario, "--operator"), operator, folder, record=record, progress=progress
-                )
+                result = operate(_operated(scenario), operator, folder, record=record, progress=progress)
         except UnreachableError as error:
             raise naming_file(options.scenario, error) from error
     ending = result.trace.meta.ending
@@ -113,17 +111,19 @@ def execute(options: argparse.Namespace) -> int:
     return 0 if ending.outcome is Outcome.COMPLETED else 1
 
 
-def _of_one_arm(scenario: "Experiment", option: str) -> "Scenario":
-    """The scenario, for what shows or asks one arm alone.
+def _operated(scenario: "Experiment") -> "Scenario":
+    """The scenario, for a person to operate.
 
     Raises:
-        SurgsimError: If it has several.
+        SurgsimError: If it has several arms.
     """
     from surgsim.errors import SurgsimError
     from surgsim.scenario.schema import Scenario
 
     if not isinstance(scenario, Scenario):
-        raise SurgsimError(f"{scenario.name}: {option} takes a scenario of one arm")
+        raise SurgsimError(
+            f"{scenario.name}: --operator takes a scenario of one arm; several are watched with --live"
+        )
     return scenario
 
 

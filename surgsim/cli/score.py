@@ -117,6 +117,7 @@ def _all(options: argparse.Namespace) -> int:
     from surgsim.errors import SurgsimError
     from surgsim.protocol.board import Board, make_board
     from surgsim.protocol.definition import CURRENT, load_protocol
+    from surgsim.protocol.entrants import check_entries
     from surgsim.protocol.seeds import seeds_of
 
     if options.controller is not None:
@@ -130,6 +131,7 @@ def _all(options: argparse.Namespace) -> int:
         seeds=seeds_of(protocol, options.seeds),
         out=out,
     )
+    check_entries(protocol, board.tracks)
     with redirect_stdout(sys.stderr):
         made = make_board(
             board, _means(options), show_batch_progress, lambda text: print_prose(text, sys.stderr)

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from surgsim.array import Array
 from surgsim.compare.intervals import (
     NOTHING,
     RESAMPLES,
@@ -21,7 +22,7 @@ from surgsim.compare.intervals import (
     too_few,
 )
 from surgsim.compare.intervals import SEEDS_DO_NOT_MATTER as CONSTANT
-from surgsim.compare.observations import Array, Observations, Texts, metric_named
+from surgsim.compare.observations import Observations, Texts, metric_named
 
 
 def scores(runs: Observations, metric: str) -> Array:

@@ -15,10 +15,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import ndtr, ndtri, stdtrit
 
-Array = NDArray[np.float64]
+from surgsim.array import Array
 
 LEVEL = 0.95
 RESAMPLES = 2000

@@ -7,12 +7,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from surgsim.array import Array
 from surgsim.compare.columns import Table
 from surgsim.errors import Outcome, SurgsimError, unknown_name
 from surgsim.metrics.catalog import METRICS
 from surgsim.metrics.metric import Metric
 
-Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 Texts = NDArray[Any]
 

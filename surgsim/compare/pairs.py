@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from surgsim.compare.observations import Array, Observations, metric_named
+from surgsim.array import Array
+from surgsim.compare.observations import Observations, metric_named
 
 Key = tuple[str, str, int]
 

@@ -3,15 +3,14 @@
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from surgsim.array import Array
 from surgsim.contract.check import Check, require
 from surgsim.contract.problems import DT
 from surgsim.teleop.bilateral.base import BilateralScheme, End, compiled_only
 from surgsim.tick.arrays import new
 from surgsim.tick.status import GOES_ON
 
-Array = NDArray[np.float64]
 _TICKS, _LATE = 400, 20
 _ROUND_TRIP_S = 2 * _LATE * DT
 

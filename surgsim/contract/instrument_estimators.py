@@ -3,8 +3,8 @@
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from surgsim.array import Array
 from surgsim.contract.arms import arm_of, on_every_arm
 from surgsim.contract.check import Check, require
 from surgsim.contract.problems import DT, velocity_problem
@@ -13,7 +13,6 @@ from surgsim.models.arm import ArmModel
 from surgsim.models.config import SceneConfig
 from surgsim.plant.state import NOT_TRACKED, TrackedPose
 
-Array = NDArray[np.float64]
 _OFF_M = 1e-3
 
 

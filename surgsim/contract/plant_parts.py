@@ -4,8 +4,9 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from surgsim.array import Array
 from surgsim.contract.arms import arm_of, on_every_arm
 from surgsim.contract.check import Check, require
 from surgsim.contract.problems import DT, random_q
@@ -13,8 +14,6 @@ from surgsim.models.build import Scene, build
 from surgsim.models.config import SceneConfig
 from surgsim.plant import PLANTS
 from surgsim.plant.base import Plant
-
-Array = NDArray[np.float64]
 
 
 def _part(config: Any) -> Any:

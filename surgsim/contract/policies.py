@@ -3,8 +3,8 @@
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from surgsim.array import Array
 from surgsim.contract.arms import arm_of, on_every_arm
 from surgsim.contract.check import Check, require
 from surgsim.contract.problems import velocity_problem
@@ -13,8 +13,6 @@ from surgsim.control.seen import seen_of_velocity
 from surgsim.models.arm import ArmModel
 from surgsim.models.config import SceneConfig
 from surgsim.tick.fields import fields_of
-
-Array = NDArray[np.float64]
 
 
 def _seen(arm: ArmModel, seed: int) -> dict[str, Array]:

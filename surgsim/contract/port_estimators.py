@@ -4,15 +4,13 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from surgsim.array import Array
 from surgsim.contract.arms import arm_of, on_every_arm
 from surgsim.contract.check import Check, require
 from surgsim.contract.problems import DT, velocity_problem
 from surgsim.control.port_estimators.base import PortProblem
 from surgsim.models.config import SceneConfig
-
-Array = NDArray[np.float64]
 
 
 def _estimates(estimator: Any, problem: PortProblem) -> Array:

@@ -1,15 +1,14 @@
 """Random problems for resolvers and torque laws: the same seed gives the same state and command."""
 
 import numpy as np
-from numpy.typing import NDArray
 
+from surgsim.array import Array
 from surgsim.control.problem import Resolution, VelocityProblem, velocity_bounds
 from surgsim.control.rcm import rcm_kinematics
 from surgsim.control.torque_laws.base import TorqueProblem
 from surgsim.models.arm import ArmModel, Kinematics
 from surgsim.tasks.base import TipCommand
 
-Array = NDArray[np.float64]
 DT = 0.001
 """Control period of the problems [s]."""
 

@@ -3,14 +3,13 @@
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from surgsim.array import Array
 from surgsim.columns import width
 from surgsim.contract.check import Check, require
 from surgsim.contract.problems import DT
 from surgsim.tasks.base import Feedback
 
-Array = NDArray[np.float64]
 _START = np.array([0.1, 0.5, 0.0])
 _TICKS = 300
 

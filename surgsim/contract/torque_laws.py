@@ -4,15 +4,13 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from surgsim.array import Array
 from surgsim.contract.arms import arm_of, cases, on_every_arm
 from surgsim.contract.check import Check, require
 from surgsim.contract.problems import DT, torque_problem
 from surgsim.control.torque_laws.base import TorqueProblem
 from surgsim.models.config import SceneConfig
-
-Array = NDArray[np.float64]
 
 
 def _rows(law: Any, problem: TorqueProblem) -> Array:

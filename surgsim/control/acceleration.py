@@ -1,16 +1,14 @@
 """Joint accelerations inside torque, velocity and position limits, in strict priority."""
 
 import numpy as np
-from numpy.typing import NDArray
 
+from surgsim.array import Array
 from surgsim.compiled import compiled
 from surgsim.control.bounds import BRAKING_SHARE, stopping_speed
 from surgsim.tick.algebra import dot, times
 from surgsim.tick.arrays import Seen
 from surgsim.tick.quadratic_program import SOLVED, solve
 from surgsim.tick.status import GOES_ON, INFEASIBLE
-
-Array = NDArray[np.float64]
 
 SPEED_SHARE = 0.97
 TORQUE_SHARE = 0.999

@@ -1,12 +1,8 @@
 """What admittances share: what of a force counts, and the mass that gives way to it."""
 
-import numpy as np
-from numpy.typing import NDArray
-
+from surgsim.array import Array
 from surgsim.compiled import compiled
 from surgsim.tick.algebra import norm
-
-Array = NDArray[np.float64]
 
 
 @compiled

@@ -18,9 +18,7 @@ second-order form that of exponential control barrier functions, Nguyen and Sree
 poles, and of the inequalities for torque-actuated robots of Quiroz-Omana and Adorno, IEEE RA-L 4:4048 (2019).
 """
 
-import numpy as np
-from numpy.typing import NDArray
-
+from surgsim.array import Array
 from surgsim.compiled import compiled
 from surgsim.control.manipulability import fill_velocity_products
 from surgsim.control.rcm import fill_rcm, fill_rcm_bias
@@ -28,7 +26,6 @@ from surgsim.tick.algebra import cross, dot, times
 from surgsim.tick.arrays import Model, Seen
 from surgsim.tick.scratch import scratch, scratch_matrix
 
-Array = NDArray[np.float64]
 Sphere = tuple[float, float, float]
 
 

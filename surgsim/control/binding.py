@@ -4,8 +4,8 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from surgsim.array import Array
 from surgsim.columns import Block
 from surgsim.compiled import address_of
 from surgsim.control.decision import ESTIMATOR, INSTRUMENT, LAW, SOLVER
@@ -27,8 +27,6 @@ from surgsim.tick.arrays import Control, Resolved, Seen, law_signature, new, poi
 from surgsim.tick.fields import fields_of
 from surgsim.tick.python_part import first_raised, python_kernel
 from surgsim.tick.status import TOLD
-
-Array = NDArray[np.float64]
 
 
 class PartArrays(NamedTuple):

@@ -2,12 +2,9 @@
 
 import math
 
-import numpy as np
-from numpy.typing import NDArray
-
+from surgsim.array import Array
 from surgsim.compiled import compiled
 
-Array = NDArray[np.float64]
 BRAKING_SHARE = 0.5
 
 

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import NonNegativeFloat, PositiveFloat
 
+from surgsim.array import Array
 from surgsim.catalog import Name, PartConfig, Surroundings
 from surgsim.columns import Block, vector, width
 from surgsim.compiled import as_parameter
@@ -32,8 +32,6 @@ from surgsim.plant.state import State
 from surgsim.tasks.base import TipCommand
 from surgsim.tasks.command import command_of, fill_command
 from surgsim.tick.status import GOES_ON
-
-Array = NDArray[np.float64]
 
 if TYPE_CHECKING:  # what a controller may use of a part, whichever it is
     AnyResolver = ResolverConfig

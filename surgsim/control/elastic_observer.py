@@ -36,9 +36,9 @@ import math
 from typing import Annotated
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field, NonNegativeFloat, PositiveFloat
 
+from surgsim.array import Array
 from surgsim.catalog import PartConfig, Surroundings
 from surgsim.compiled import compiled
 from surgsim.control.filters import filter_gains
@@ -50,7 +50,6 @@ from surgsim.tick.nominal import dynamics, kinematics
 from surgsim.tick.scratch import scratch, scratch_matrix
 from surgsim.tick.status import GOES_ON, RANK_LOST
 
-Array = NDArray[np.float64]
 Q, V, S, W, LINK, MOTOR, REST, DRY, FRICTION = range(9)
 """Rows of the memory (n,): the state, d, f_r, -c, F, F y; after them M (n, n), then the commands sent."""
 ROWS = 9

@@ -3,13 +3,10 @@
 from collections.abc import Callable, Mapping
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
+from surgsim.array import Array
 from surgsim.errors import Outcome
 from surgsim.tick.status import DIVERGED, EXTERNAL, INFEASIBLE, RANK_LOST
 
-Array = NDArray[np.float64]
 Words = str | Callable[[Any], str]
 """What a status means: words, or a function of what the kernel saw."""
 _OUTCOMES = {

@@ -8,8 +8,9 @@ be compiled is, and it enters Python for the rest, when it needs it. The gains o
 from collections.abc import Callable
 from typing import ClassVar, Protocol
 
+from surgsim.array import Array
 from surgsim.compiled import call_at, compiled
-from surgsim.tick.arrays import Array, Numbers, Record, Resolved, Seen
+from surgsim.tick.arrays import Numbers, Record, Resolved, Seen
 from surgsim.tick.fields import Fields
 from surgsim.tick.overlay import overlay
 from surgsim.tick.views import numbers

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 from numba.core.dispatcher import Dispatcher
-from numpy.typing import NDArray
 
+from surgsim.array import Array
 from surgsim.compiled import address_of
 from surgsim.control.failure import ControlFailure
 from surgsim.control.inside import Head
@@ -21,7 +21,6 @@ from surgsim.tick.overlay import laid_over
 from surgsim.tick.python_part import PythonPart, python_kernel
 from surgsim.tick.status import INFEASIBLE, RANK_LOST, TOLD
 
-Array = NDArray[np.float64]
 Call = Callable[[], int | None]
 
 

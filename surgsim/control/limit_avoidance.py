@@ -1,14 +1,10 @@
 """Null-space motion away from the ends of the joints' ranges, whichever resolver answers."""
 
-import numpy as np
-from numpy.typing import NDArray
-
 from surgsim.compiled import compiled
 from surgsim.tick.algebra import nearest
 from surgsim.tick.arrays import Resolved, Seen
 from surgsim.tick.scratch import scratch, scratch_matrix
 
-Array = NDArray[np.float64]
 GAIN_PER_S = 5.0
 """Speed per way into the zone: the posture's default gains, which follow it, are critically damped then."""
 _MOST_OF_RANGE = 0.25

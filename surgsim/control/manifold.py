@@ -6,8 +6,8 @@ They evaluate a nominal model of their own where they go. A point of the manifol
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from surgsim.array import Array
 from surgsim.compiled import compiled
 from surgsim.control.manipulability import (
     fill_chain_slope,
@@ -33,8 +33,6 @@ from surgsim.tick.arrays import Model
 from surgsim.tick.nominal import kinematics
 from surgsim.tick.quadratic_program import SOLVED, solve
 from surgsim.tick.scratch import scratch, scratch_matrix
-
-Array = NDArray[np.float64]
 
 PROJECTION_STEPS = 8
 CLIMB_STEPS, CLIMB_TOLERANCE_RAD = 60, 1e-9

@@ -10,16 +10,14 @@ so no finite differences are needed.
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from surgsim.array import Array
 from surgsim.compiled import compiled
 from surgsim.models.arm import Kinematics
 from surgsim.tick.algebra import back_substitute_rows, determinant, dot, factor, outer_product
 from surgsim.tick.arrays import Model
 from surgsim.tick.nominal import kinematics
 from surgsim.tick.scratch import scratch, scratch_matrix
-
-Array = NDArray[np.float64]
 
 
 @compiled

@@ -5,9 +5,9 @@ from collections.abc import Mapping
 import mink
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from surgsim.array import Array
+
 _VIEWS = ("_data", "_N", "_d", "_p")
 
 

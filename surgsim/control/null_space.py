@@ -1,11 +1,9 @@
 """Velocity-level null-space tools, for Jacobians of full row rank."""
 
 import numpy as np
-from numpy.typing import NDArray
 
+from surgsim.array import Array
 from surgsim.compiled import compiled
-
-Array = NDArray[np.float64]
 
 
 def least_velocity(J: Array, v: Array, qdot_0: Array | None = None) -> Array:

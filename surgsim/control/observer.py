@@ -2,14 +2,11 @@
 
 import math
 
-import numpy as np
-from numpy.typing import NDArray
-
+from surgsim.array import Array
 from surgsim.compiled import compiled
 from surgsim.tick.algebra import back_substitute, factor, times
 from surgsim.tick.scratch import scratch, scratch_matrix
 
-Array = NDArray[np.float64]
 OFFSET_MEMORY_S = 0.05
 """Time constant of the mean difference between measured and commanded torque [s]."""
 

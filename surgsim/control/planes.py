@@ -5,15 +5,13 @@ from collections.abc import Sequence
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import FiniteFloat, model_validator
 
+from surgsim.array import Array
 from surgsim.catalog import PartConfig
 from surgsim.compiled import compiled
 from surgsim.models.config import Vec3
 from surgsim.tick.arrays import Seen
-
-Array = NDArray[np.float64]
 
 
 class PlaneConfig(PartConfig):

@@ -1,15 +1,12 @@
 """The lateral force of the wall on the shaft, from joint torques or from a sensor at the flange."""
 
-import numpy as np
-from numpy.typing import NDArray
-
+from surgsim.array import Array
 from surgsim.compiled import compiled
 from surgsim.control.rcm import fill_rcm
 from surgsim.tick.algebra import back_substitute, back_substitute_rows, cross, dot, factor, outer_product
 from surgsim.tick.arrays import Seen
 from surgsim.tick.scratch import scratch, scratch_matrix
 
-Array = NDArray[np.float64]
 LEAST_LEVER_M = 0.02
 """Shorter levers between two places of the shaft do not tell their forces apart."""
 

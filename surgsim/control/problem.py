@@ -3,8 +3,8 @@
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from surgsim.array import Array
 from surgsim.compiled import compiled
 from surgsim.control.bounds import fill_braking_bounds, fill_velocity_bounds
 from surgsim.control.rcm import Rcm
@@ -13,7 +13,6 @@ from surgsim.models.build import JointLimits
 from surgsim.plant.state import Wrench
 from surgsim.tasks.base import TipCommand
 
-Array = NDArray[np.float64]
 NO_VALUES = np.zeros(0)
 NO_VALUES.flags.writeable = False
 

@@ -7,12 +7,11 @@ from typing import Any
 
 import daqp
 import numpy as np
-from numpy.typing import NDArray
 
+from surgsim.array import Array
 from surgsim.packages import require
 from surgsim.tick.quadratic_program import SOLVED, solve, workspace
 
-Array = NDArray[np.float64]
 Solve = Callable[[Array, Array, Array, Array, Array, Array, Array], Array | None]
 """H, f, lower, upper, G, G_lower, G_upper to the minimiser, or None: what a back end is."""
 

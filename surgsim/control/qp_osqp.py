@@ -5,10 +5,9 @@ from typing import Any
 
 import numpy as np
 import osqp
-from numpy.typing import NDArray
 from scipy.sparse import csc_matrix, identity
 
-Array = NDArray[np.float64]
+from surgsim.array import Array
 
 _SETTINGS = {
     "verbose": False,

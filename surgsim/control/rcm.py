@@ -15,16 +15,14 @@ A 3-row form through the cross product has rank 2 only; it is kept for the paper
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from surgsim.array import Array
 from surgsim.compiled import compiled
 from surgsim.models.arm import Kinematics
 from surgsim.spatial import cross as cross_product
 from surgsim.spatial import skew
 from surgsim.tick.algebra import cross, dot, times
 from surgsim.tick.scratch import scratch
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -1,13 +1,12 @@
 """Limits that exclude each other: which give way, and by how little."""
 
 import numpy as np
-from numpy.typing import NDArray
 
+from surgsim.array import Array
 from surgsim.compiled import compiled
 from surgsim.tick.algebra import norm
 from surgsim.tick.quadratic_program import SOLVED, solve
 
-Array = NDArray[np.float64]
 _RIDGE = 1e-8
 _ROOM = 1e-7
 """What is given beyond the least, so that the programs that follow are not lost to rounding."""

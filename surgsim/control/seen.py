@@ -3,7 +3,6 @@
 from weakref import WeakKeyDictionary
 
 import numpy as np
-from numpy.typing import NDArray
 
 from surgsim.control.problem import VelocityProblem
 from surgsim.control.rcm import Rcm
@@ -14,7 +13,6 @@ from surgsim.tasks.command import command_of, fill_command_of
 from surgsim.tick.arrays import Seen, new
 from surgsim.tick.fields import Fields
 
-Array = NDArray[np.float64]
 _blanks: WeakKeyDictionary[ArmModel, dict[tuple[float, bool, float], Seen]] = WeakKeyDictionary()
 
 

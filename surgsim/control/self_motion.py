@@ -8,8 +8,8 @@ which leaves mu as it is.
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from surgsim.array import Array
 from surgsim.control.manifold import (
     CLIMB_STEPS,
     CLIMB_TOLERANCE_RAD,
@@ -28,7 +28,6 @@ from surgsim.tick.algebra import null_space
 from surgsim.tick.arrays import Model, new
 from surgsim.tick.nominal import kinematics
 
-Array = NDArray[np.float64]
 MARGIN_RAD = 0.002
 """Distance that self-motion keeps from the joint limits."""
 _AT_REST = np.zeros(3)

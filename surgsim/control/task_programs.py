@@ -1,16 +1,14 @@
 """Tasks under limits as quadratic programs, in strict priority or weighted; limits that conflict give way."""
 
 import numpy as np
-from numpy.typing import NDArray
 
+from surgsim.array import Array
 from surgsim.compiled import compiled
 from surgsim.control.acceleration import cascade
 from surgsim.control.relaxation import relax
 from surgsim.tick.algebra import times
 from surgsim.tick.quadratic_program import SOLVED, solve
 from surgsim.tick.status import GOES_ON, INFEASIBLE
-
-Array = NDArray[np.float64]
 
 
 @compiled

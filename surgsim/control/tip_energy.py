@@ -2,16 +2,13 @@
 
 import math
 
-import numpy as np
-from numpy.typing import NDArray
-
+from surgsim.array import Array
 from surgsim.compiled import compiled
 from surgsim.teleop.tank import affordable
 from surgsim.tick.algebra import back_substitute_rows, dot, factor, norm, outer_product, times
 from surgsim.tick.arrays import Seen
 from surgsim.tick.scratch import scratch, scratch_matrix
 
-Array = NDArray[np.float64]
 MARGIN = 1.1
 """What the inertia is taken for, over the model's: 10 % too little would cost the budget 11 % of itself."""
 BRAKE_PER_S = 100.0

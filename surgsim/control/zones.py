@@ -23,9 +23,9 @@ from collections.abc import Sequence
 from typing import Literal, Self
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import PositiveFloat, model_validator
 
+from surgsim.array import Array
 from surgsim.catalog import PartConfig
 from surgsim.compiled import compiled
 from surgsim.models.config import Vec3
@@ -33,7 +33,6 @@ from surgsim.tick.algebra import cross, dot
 from surgsim.tick.arrays import Seen
 from surgsim.tick.scratch import scratch
 
-Array = NDArray[np.float64]
 OF_SHAFT, IS_LINE, OUTSIDE, RADIUS, POINT, DIRECTION = 0, 1, 2, 3, 4, 7
 """Places of a zone's numbers; the point and the direction take three each."""
 ZONE = 10

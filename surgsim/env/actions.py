@@ -5,8 +5,8 @@ from typing import Any, Literal, get_args
 
 import numpy as np
 from dm_env import specs
-from numpy.typing import NDArray
 
+from surgsim.array import Array
 from surgsim.catalog import PartConfig
 from surgsim.control.controller import ControllerConfig
 from surgsim.control.resolvers import RESOLVERS
@@ -17,9 +17,9 @@ from surgsim.control.torque_laws.joint_impedance import JointImpedanceConfig
 from surgsim.control.torque_laws.policy import PolicyLawConfig
 from surgsim.errors import SurgsimError, unknown_name
 from surgsim.models.build import JointLimits
+from surgsim.scenario.arms import ArmsScenario, Experiment
 from surgsim.scenario.schema import Scenario
 
-Array = NDArray[np.float64]
 Action = Literal["tip_velocity", "joint_velocity", "torque"]
 AGENT = "agent"
 """Name of the agent's controller and policy in an episode's scenario."""
@@ -78,6 +78,34 @@ def with_agent(
         limit_zone_rad=own.limit_zone_rad,
     )
     return scenario.model_copy(update={"controller": controller})
+
+
+def with_agent_at(
+    scenario: Experiment,
+    arm: str | None,
+    action: Action,
+    resolver: str | PartConfig | None,
+    decimation: int,
+) -> Experiment:
+    """`scenario` with an agent as `with_agent`; of several arms it drives one, and the others stay.
+
+    Raises:
+        SurgsimError: As `with_agent`, and if it is not said which of several arms, or there is but one.
+    """
+    if not isinstance(scenario, ArmsScenario):
+        if arm is not None:
+            raise SurgsimError(f"{scenario.name} has one arm: leave out arm, '{arm}'")
+        return with_agent(scenario, action, resolver, decimation)
+    if arm is None:
+        raise SurgsimError(
+            f"{scenario.name} has the arms {', '.join(scenario.names)}: say by arm which one the agent "
+            "drives; the others have their own controllers"
+        )
+    controller = with_agent(scenario.of(arm), action, resolver, decimation).controller
+    arms = tuple(
+        one.model_copy(update={"controller": controller}) if one.name == arm else one for one in scenario.arms
+    )
+    return scenario.model_copy(update={"arms": arms})
 
 
 def action_spec(scenario: Scenario, limits: JointLimits) -> specs.BoundedArray:

@@ -7,10 +7,11 @@ from typing import Any
 from dm_control.rl import control
 
 from surgsim.catalog import PartConfig
-from surgsim.env.actions import Action, with_agent
+from surgsim.env.actions import Action, with_agent_at
 from surgsim.env.physics import EpisodeState, SurgsimPhysics
 from surgsim.env.task import ScenarioTask
-from surgsim.scenario.load import load_scenario
+from surgsim.scenario.arms import ArmsScenario, Experiment
+from surgsim.scenario.load import load_experiment
 from surgsim.scenario.schema import Scenario
 
 DECIMATION = 20
@@ -62,8 +63,9 @@ class Environment(control.Environment):
 
 
 def load(
-    scenario: str | Scenario,
+    scenario: str | Experiment,
     *,
+    arm: str | None = None,
     action: Action = "tip_velocity",
     resolver: str | PartConfig | None = None,
     decimation: int = DECIMATION,
@@ -75,6 +77,7 @@ def load(
 
     Args:
         scenario: Path or shipped name of a scenario, or one that is loaded.
+        arm: Of several arms the one that the agent drives; the others have their own controllers.
         action: `tip_velocity` (3) [m/s], which the resolver and the scenario's torque law turn into torques;
             `joint_velocity` (n) [rad/s], which joint impedance does; or `torque` (n) [N m].
         resolver: Resolves tip velocities: a resolver's name or config; None: the scenario's own.
@@ -84,8 +87,8 @@ def load(
     Raises:
         SurgsimError: If the scenario or an argument is wrong.
     """
-    if not isinstance(scenario, Scenario):
-        scenario = load_scenario(scenario)
-    physics = SurgsimPhysics(with_agent(scenario, action, resolver, decimation))
+    if not isinstance(scenario, Scenario | ArmsScenario):
+        scenario = load_experiment(scenario)
+    physics = SurgsimPhysics(with_agent_at(scenario, arm, action, resolver, decimation), arm)
     task = ScenarioTask(physics, scenario.seed if seed is None else seed)
     return Environment(physics, task, n_sub_steps=decimation)

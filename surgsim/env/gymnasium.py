@@ -10,15 +10,15 @@ from typing import Any
 import gymnasium
 import numpy as np
 from gymnasium import spaces
-from numpy.typing import NDArray
 
+from surgsim.array import Array
 from surgsim.catalog import PartConfig
 from surgsim.env.actions import Action
 from surgsim.env.environment import DECIMATION, EnvironmentState, load
-from surgsim.scenario.load import load_scenario, of_one_arm, shipped
+from surgsim.scenario.arms import ArmsScenario, Experiment
+from surgsim.scenario.load import load_experiment, shipped
 from surgsim.scenario.schema import Scenario
 
-Array = NDArray[np.float64]
 Observation = dict[str, Any]
 
 
@@ -30,6 +30,7 @@ class SurgsimEnv(gymnasium.Env[Observation, Any]):
 
     Args:
         scenario: Path or shipped name of a scenario, or one that is loaded.
+        arm: See `surgsim.env.load`.
         action: See `surgsim.env.load`.
         resolver: See `surgsim.env.load`.
         decimation: See `surgsim.env.load`.
@@ -44,17 +45,18 @@ class SurgsimEnv(gymnasium.Env[Observation, Any]):
 
     def __init__(
         self,
-        scenario: str | Scenario,
+        scenario: str | Experiment,
         *,
+        arm: str | None = None,
         action: Action = "tip_velocity",
         resolver: str | PartConfig | None = None,
         decimation: int = DECIMATION,
         assignments: Sequence[str] = (),
         render_mode: str | None = None,
     ) -> None:
-        if not isinstance(scenario, Scenario):
-            scenario = load_scenario(scenario, assignments=assignments)
-        self.environment = load(scenario, action=action, resolver=resolver, decimation=decimation)
+        if not isinstance(scenario, Scenario | ArmsScenario):
+            scenario = load_experiment(scenario, assignments=assignments)
+        self.environment = load(scenario, arm=arm, action=action, resolver=resolver, decimation=decimation)
         self.render_mode = render_mode
         self._scale = self.environment.action_spec().maximum
         self.action_space = spaces.Box(-1.0, 1.0, self._scale.shape, np.float64)
@@ -124,8 +126,8 @@ def _spelled(word: str) -> str:
 
 
 def register() -> None:
-    """Register every shipped scenario of one arm that is not registered yet."""
-    for name in of_one_arm(shipped()):
+    """Register every shipped scenario that is not registered yet; one of several arms is made with `arm`."""
+    for name in shipped():
         known = environment_id(name)
         if known not in gymnasium.registry:
             gymnasium.register(known, entry_point=f"{__name__}:SurgsimEnv", kwargs={"scenario": name})

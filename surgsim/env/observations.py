@@ -4,8 +4,8 @@ from collections import OrderedDict
 
 import numpy as np
 from dm_env import specs
-from numpy.typing import NDArray
 
+from surgsim.array import Array
 from surgsim.control.policies.observation import observe
 from surgsim.control.rcm import rcm_kinematics
 from surgsim.plant.state import State
@@ -13,7 +13,6 @@ from surgsim.scenario.schema import Scenario
 from surgsim.simulate.setup import Setup
 from surgsim.tasks.base import TipCommand
 
-Array = NDArray[np.float64]
 Observations = OrderedDict[str, Array]
 Specs = OrderedDict[str, specs.BoundedArray]
 
@@ -50,13 +49,13 @@ def observation_of(setup: Setup, state: State, command: TipCommand, bounds: Spec
     return OrderedDict((name, _cut(value, bounds[name])) for name, value in observe(seen).items())
 
 
-def observation_spec(setup: Setup) -> Specs:
-    """Shapes and bounds of the observation, in order."""
+def observation_spec(setup: Setup, duration_s: float) -> Specs:
+    """Shapes and bounds of the observation in an episode of at most `duration_s` [s], in order."""
     scenario, limits = setup.scenario, setup.scene.limits
     reach = _REACH_M + _away(scenario)
     speed, ones = _JOINT_SPEED_MARGIN * limits.velocity, np.ones(3)
     bounds: dict[str, tuple[Array, Array]] = {
-        "time": (np.zeros(1), np.array([setup.task.duration_s + scenario.simulation.control_period_s])),
+        "time": (np.zeros(1), np.array([duration_s + scenario.simulation.control_period_s])),
         "joint_position": (limits.q_min - _JOINT_MARGIN_RAD, limits.q_max + _JOINT_MARGIN_RAD),
         "joint_velocity": (-speed, speed),
         "tip_position": (-reach * ones, reach * ones),

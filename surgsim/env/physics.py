@@ -4,28 +4,28 @@ from dataclasses import dataclass
 
 import numpy as np
 from dm_control.rl import control
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from surgsim.control.policies.registry import offering
 from surgsim.env.actions import AGENT, Agent
 from surgsim.env.rewards import errors
 from surgsim.errors import SurgsimError
 from surgsim.plant.state import State
-from surgsim.scenario.schema import Scenario
-from surgsim.simulate.loop import Simulation
-from surgsim.simulate.setup import Setup, prepare
+from surgsim.scenario.arms import Experiment
+from surgsim.simulate.arms_setup import ArmsSetup
+from surgsim.simulate.loop import Simulation, prepared
+from surgsim.simulate.setup import Setup
 from surgsim.simulate.snapshot import Snapshot
 from surgsim.tasks.base import TipCommand
+from surgsim.tasks.command import command_of
 from surgsim.trace.trace import Ending, Trace
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True)
 class EpisodeState:
     """An episode at a tick: its scenario, seed included, and the run."""
 
-    scenario: Scenario
+    scenario: Experiment
     snapshot: Snapshot
 
 
@@ -37,31 +37,49 @@ class SurgsimPhysics(control.Physics):
 
     Args:
         scenario: A scenario with an agent, see `with_agent`.
+        arm: Of several arms the one that the agent drives.
 
     Raises:
         SurgsimError: If the scenario cannot be started.
     """
 
-    def __init__(self, scenario: Scenario) -> None:
-        self._scenario = scenario
+    def __init__(self, scenario: Experiment, arm: str | None = None) -> None:
+        self._scenario, self._arm = scenario, arm
         self._agent = Agent()
-        self._setup = self._prepare()
-        self._simulation = Simulation(self._setup)
+        self._begin()
+
+    def _begin(self) -> None:
+        """Build the episode."""
+        with offering(AGENT, self._agent):
+            whole = prepared(self._scenario)
+        self._duration_s = whole.duration_s
+        self._setup = whole.arms[self._arm or ""] if isinstance(whole, ArmsSetup) else whole
+        self._simulation = Simulation(whole)
+
+    @property
+    def scenario(self) -> Experiment:
+        """The scenario of the episode."""
+        return self._scenario
+
+    @property
+    def duration_s(self) -> float:
+        """How long the episode lasts at most [s]."""
+        return self._duration_s
 
     @property
     def setup(self) -> Setup:
-        """The built parts of the episode."""
+        """The built parts of the agent's arm."""
         return self._setup
 
     @property
     def state(self) -> State:
-        """What a controller sees now."""
-        return self._simulation.state
+        """What the controller of the agent's arm sees now."""
+        return self._setup.plant.state()
 
     @property
     def command(self) -> TipCommand:
-        """What the task asks for now."""
-        return self._simulation.command
+        """What the task of the agent's arm asks for now."""
+        return command_of(self._setup.controller.control.command)
 
     @property
     def ending(self) -> Ending | None:
@@ -69,8 +87,9 @@ class SurgsimPhysics(control.Physics):
         return self._simulation.ending
 
     def errors(self) -> tuple[float, float | None]:
-        """Tip and RCM error now [m]."""
-        return errors(self._setup.plant.truth(), self.command, self._scenario.trocar is not None)
+        """Tip and RCM error of the agent's arm now [m]."""
+        has_trocar = self._setup.scenario.trocar is not None
+        return errors(self._setup.plant.truth(), self.command, has_trocar)
 
     def trace(self) -> Trace:
         """The trace of an episode that has ended.
@@ -116,8 +135,7 @@ class SurgsimPhysics(control.Physics):
 
     def after_reset(self) -> None:
         """Build the episode's plant and controller from its seed."""
-        self._setup = self._prepare()
-        self._simulation = Simulation(self._setup)
+        self._begin()
 
     def step(self, n_sub_steps: int = 1) -> None:
         """Run control ticks until they are done or the episode ends."""
@@ -131,12 +149,8 @@ class SurgsimPhysics(control.Physics):
 
     def time(self) -> float:
         """Simulated time [s]."""
-        return self._simulation.state.t_s
+        return self._simulation.time_s
 
     def timestep(self) -> float:
         """Control period [s]."""
         return self._scenario.simulation.control_period_s
-
-    def _prepare(self) -> Setup:
-        with offering(AGENT, self._agent):
-            return prepare(self._scenario)

@@ -1,14 +1,11 @@
 """Rewards from the errors that the metrics are made of."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from surgsim.metrics.accuracy import CONVERGED_RCM_M, CONVERGED_TIP_M
 from surgsim.plant.truth import Truth
 from surgsim.spatial import shaft_distance
 from surgsim.tasks.base import TipCommand
-
-Array = NDArray[np.float64]
 
 
 def errors(truth: Truth, command: TipCommand, has_trocar: bool) -> tuple[float, float | None]:

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from dm_control.rl import control
 from dm_env import specs
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from surgsim.env.actions import action_spec
 from surgsim.env.observations import Observations, Specs, observation_of, observation_spec
@@ -15,14 +15,13 @@ from surgsim.env.rewards import reward
 from surgsim.errors import Outcome
 from surgsim.trace.trace import Ending, Trace
 
-Array = NDArray[np.float64]
-
 
 class ScenarioTask(control.Task):
-    """The scenario's task, trocar and safety limits.
+    """The scenario's task, trocar and safety limits, of several arms those of the agent's.
 
     An episode that reaches the task's end is cut off there (discount 1); one that passes a safety limit, or
-    whose controller fails, is lost (discount 0), and with it the rewards that were still to come.
+    whose controller fails, is lost (discount 0), and with it the rewards that were still to come. With
+    several arms it goes on until all tasks are done, and what ends it may be another arm's.
 
     Args:
         physics: The physics that it is for.
@@ -32,7 +31,7 @@ class ScenarioTask(control.Task):
     def __init__(self, physics: SurgsimPhysics, seed: int) -> None:
         self._physics = physics
         self._action = action_spec(physics.setup.scenario, physics.setup.scene.limits)
-        self._observation = observation_spec(physics.setup)
+        self._observation = observation_spec(physics.setup, physics.duration_s)
         self.reseed(seed)
 
     @property
@@ -43,7 +42,7 @@ class ScenarioTask(control.Task):
     @property
     def episode_seed(self) -> int:
         """Seed of the episode's scenario."""
-        return self._physics.setup.scenario.seed
+        return self._physics.scenario.seed
 
     def trace(self) -> Trace:
         """The trace of the last episode, for the metrics.

@@ -8,6 +8,7 @@ from typing import Any, Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
+from surgsim.array import Array
 from surgsim.env.environment import DECIMATION
 from surgsim.env.rewards import reward
 from surgsim.errors import SurgsimError, unknown_name
@@ -16,7 +17,6 @@ from surgsim.recording.scene import scenario_of
 from surgsim.scenario.arms import each_arm
 from surgsim.trace.trace import Trace
 
-Array = NDArray[np.float64]
 Action = Literal["tip_velocity", "joint_velocity", "torque"]
 ACTIONS: tuple[Action, ...] = get_args(Action)
 
@@ -168,7 +168,10 @@ def runs_of(subjects: Sequence[Subject]) -> list[RunSubject]:
             raise SurgsimError("episodes are of runs and batches, not of a study")
     for run in found:
         if run.arm or run.arms:
-            raise SurgsimError(f"{run.path}: a run of several arms; episodes are of runs of one")
+            raise SurgsimError(
+                f"{run.path}: a run of several arms; episodes are of runs of one; "
+                "--data FILE takes all columns"
+            )
     return found
 
 

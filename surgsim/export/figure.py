@@ -1,12 +1,12 @@
-"""Figures for papers: errors of runs over time, or figures of a batch's controllers as box plots."""
+"""Figures for papers: errors of runs over time, a batch's controllers as box plots, tables of a study."""
 
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from surgsim.array import Array
 from surgsim.compare.leaderboard import leaderboard
 from surgsim.compare.observations import Observations, metric_named
 from surgsim.errors import SurgsimError
@@ -19,14 +19,14 @@ from surgsim.export.paper_style import (
     new_figure,
     strokes,
 )
-from surgsim.export.subjects import BatchSubject, RunSubject, Subject, arm_by_arm
+from surgsim.export.study_figure import LOGARITHMIC, study_figure
+from surgsim.export.subjects import BatchSubject, RunSubject, StudySubject, Subject, arm_by_arm
 from surgsim.export.written import write_whole
 from surgsim.metrics.catalog import METRICS
 from surgsim.recording.polyline import drawn_rows
 
 __all__ = ["SUFFIXES", "write_figure"]
 
-Array = NDArray[np.float64]
 
 _MM = 1e3
 _ERRORS = (
@@ -37,9 +37,6 @@ _ERRORS = (
 
 _NEAR = 0.4
 """Share of a limit above which an axis reaches up to it."""
-
-_LOGARITHMIC = 20.0
-"""Ratio of the largest to the smallest of what is compared above which an axis is logarithmic."""
 
 _DECADES = 100.0
 """How far a logarithmic axis reaches below the smallest of the runs' largest errors."""
@@ -58,22 +55,28 @@ _MOST_POINTS = 150
 
 
 def write_figure(
-    path: Path, subjects: Sequence[Subject], metrics: Sequence[str] = (), width: str = "column"
+    path: Path,
+    subjects: Sequence[Subject],
+    metrics: Sequence[str] = (),
+    width: str = "column",
+    study_table: str | None = None,
 ) -> None:
-    """Draw runs over time, or the controllers of a batch.
+    """Draw runs over time, the controllers of a batch, or a table of a study.
 
     Args:
         path: `.pdf`, `.svg` or `.png`.
-        subjects: Runs, or one batch.
-        metrics: Of a batch; the first two that its page ranks by, if none is named.
+        subjects: Runs; or one batch or study.
+        metrics: Of a batch, the first two that its page ranks by if none is named; of a study columns.
         width: `column` or `page`, see `paper_style.WIDTHS_IN`.
+        study_table: Which table of a study; None: the main one.
 
     Raises:
         SurgsimError: If there is nothing to draw, a run was not recorded, a metric is unknown, or the disk
             refuses.
     """
-    for name in metrics:
-        metric_named(name)
+    if not any(isinstance(subject, StudySubject) for subject in subjects):
+        for name in metrics:
+            metric_named(name)
     subjects = arm_by_arm(subjects)
     runs = [subject for subject in subjects if isinstance(subject, RunSubject)]
     with journal_style():
@@ -81,10 +84,10 @@ def write_figure(
             figure = _over_time(runs, width)
         elif len(subjects) == 1 and isinstance(subjects[0], BatchSubject):
             figure = _by_controller(subjects[0], metrics, width)
+        elif len(subjects) == 1 and isinstance(subjects[0], StudySubject):
+            figure = study_figure(subjects[0], study_table, metrics, width)
         else:
-            raise SurgsimError(
-                "--figure is of runs, or of one batch: give these alone. `surgsim reproduce` draws a study's"
-            )
+            raise SurgsimError("--figure is of runs, or of one batch or one study: give these alone")
         content = figure_bytes(figure, path)
     write_whole(path, content)
 
@@ -117,7 +120,7 @@ def _error(ax: Any, runs: Sequence[RunSubject], column: str) -> None:
         ax.text(0.5, 0.5, "not defined", transform=ax.transAxes, ha="center", va="center", color="0.4")
         ax.set_yticks([])
         return
-    least = min(found) / _DECADES if max(found) > _LOGARITHMIC * min(found) else 0.0
+    least = min(found) / _DECADES if max(found) > LOGARITHMIC * min(found) else 0.0
     names = told_apart(runs)
     for run, name, colour, stroke in zip(runs, names, colours(len(runs)), strokes(len(runs)), strict=True):
         values = run.trace[column] * _MM
@@ -193,7 +196,7 @@ def _boxes(ax: Any, runs: Observations, metric: str, names: Sequence[str]) -> No
     values = [_finite(group.values(metric)) for group in groups]
     medians = [float(np.median(each)) for each in values if each.size]
     everything = np.concatenate(values) if values else np.zeros(0)
-    if medians and min(everything) > 0.0 and max(medians) > _LOGARITHMIC * min(medians):
+    if medians and min(everything) > 0.0 and max(medians) > LOGARITHMIC * min(medians):
         ax.set_xscale("log")
     for place, (each, colour) in enumerate(zip(values, colours(len(names)), strict=True)):
         _box(ax, each, place, colour)

@@ -14,16 +14,14 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
-from numpy.typing import NDArray
 
+from surgsim.array import Array
 from surgsim.control.resolvers.policy import PolicyConfig
 from surgsim.errors import Outcome, SurgsimError
 from surgsim.export.episodes import Action, Episode, check_alike, episode_of, origin_of, runs_of
 from surgsim.export.subjects import Subject
 from surgsim.recording.files import write_file
 from surgsim.runs.folder import whole_folder
-
-Array = NDArray[np.float64]
 
 VERSION = "0.5.4"
 META = "data/metadata.json"

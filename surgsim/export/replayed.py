@@ -6,6 +6,7 @@ from contextlib import contextmanager
 import numpy as np
 from numpy.typing import NDArray
 
+from surgsim.array import Array
 from surgsim.errors import SurgsimError, unknown_name
 from surgsim.models.drawing import Drawing, FixedCamera, Line, Picture
 from surgsim.recording import palette
@@ -14,8 +15,6 @@ from surgsim.recording.polyline import drawn_rows
 from surgsim.recording.replay import Replay
 from surgsim.recording.scene import rebuild_all, scenario_of
 from surgsim.trace.trace import Trace
-
-Array = NDArray[np.float64]
 
 CAMERAS = {
     "overview": "the theatre",

@@ -8,8 +8,9 @@ import numpy as np
 from surgsim.compare.leaderboard import LeaderboardRow, leaderboard
 from surgsim.compare.observations import Observations, metric_named
 from surgsim.compare.wording import bracket, heading_of, number
-from surgsim.errors import SurgsimError
+from surgsim.errors import SurgsimError, unknown_name
 from surgsim.export.paper_table import WRITERS, PaperColumn, PaperTable
+from surgsim.export.study_figure import keys_of
 from surgsim.export.subjects import BatchSubject, RunSubject, StudySubject, Subject, arm_by_arm
 from surgsim.export.written import write_whole
 from surgsim.metrics.catalog import METRICS
@@ -35,7 +36,8 @@ def write_table(
     Args:
         path: `.tex`, `.md` or `.csv`.
         subjects: Runs; or one batch or study.
-        metrics: Names of the metrics to show; those of `DEFAULT_METRICS` that there are, if none is named.
+        metrics: Names of the metrics to show; by default those of `DEFAULT_METRICS` that there are. Of a
+            study: columns; all by default.
         study_table: Which table of a study; None: the main one.
 
     Raises:
@@ -48,8 +50,9 @@ def table_of(
     subjects: Sequence[Subject], metrics: Sequence[str] = (), study_table: str | None = None
 ) -> PaperTable:
     """The table, see `write_table`."""
-    for name in metrics:
-        metric_named(name)
+    if not any(isinstance(subject, StudySubject) for subject in subjects):
+        for name in metrics:
+            metric_named(name)
     subjects = arm_by_arm(subjects)
     runs = [subject for subject in subjects if isinstance(subject, RunSubject)]
     if len(runs) == len(subjects):
@@ -60,7 +63,7 @@ def table_of(
     if isinstance(subject, BatchSubject):
         return batch_table(subject, metrics)
     assert isinstance(subject, StudySubject)
-    return _study_table(subject, study_table)
+    return _study_table(subject, study_table, metrics)
 
 
 def batch_table(batch: BatchSubject, metrics: Sequence[str] = ()) -> PaperTable:
@@ -164,11 +167,14 @@ def _runs_table(runs: Sequence[RunSubject], metrics: Sequence[str]) -> PaperTabl
     return PaperTable(columns=columns)
 
 
-def _study_table(study: StudySubject, table: str | None) -> PaperTable:
+def _study_table(study: StudySubject, table: str | None, chosen: Sequence[str]) -> PaperTable:
     """A table of a study, formatted as on its page."""
     _, rows = study.rows(table)
+    for name in chosen:
+        if name not in rows[0]:
+            raise SurgsimError(f"--metric: {unknown_name(name, 'column of this table', list(rows[0]))}")
     columns = []
-    for key in rows[0]:
+    for key in dict.fromkeys((*keys_of(rows), *chosen)) if chosen else rows[0]:
         cells: list[Cell] = [row[key] for row in rows]
         texts = [_signed(cell, format_cell(cell, column=key)) for cell in cells]
         right = all(isinstance(cell, int | float | None) for cell in cells)

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from surgsim.array import Array
 from surgsim.errors import SurgsimError
 from surgsim.export.moving import SUFFIXES, film, period_of
 from surgsim.export.names import told_apart
@@ -20,7 +20,6 @@ from surgsim.recording.files import replacing
 
 __all__ = ["SUFFIXES", "VideoSettings", "write_video"]
 
-Array = NDArray[np.float64]
 Progress = Callable[[int, int], None]
 """Called with how many pictures are drawn, of how many."""
 

@@ -5,11 +5,10 @@ from dataclasses import dataclass
 from typing import Literal, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from surgsim.array import Array
 from surgsim.teleop.manual.intent import Intent
 
-Array = NDArray[np.float64]
 Action = Literal["jaw", "faster", "slower", "end"]
 SPEEDS_M_PER_S = (0.002, 0.005, 0.01, 0.02, 0.04)
 _FIRST = 3

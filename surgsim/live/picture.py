@@ -2,14 +2,13 @@
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
+from surgsim.array import Array
 from surgsim.models.build import build
 from surgsim.plant.other_joints import joint_columns
 from surgsim.plant.truth import Truth
 from surgsim.simulate.setup import Setup
 
-Array = NDArray[np.float64]
 _FROM_TIP_M = 0.16
 _ELEVATION_DEG = -35.0
 

@@ -7,8 +7,8 @@ from contextlib import contextmanager
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from surgsim.array import Array
 from surgsim.live.controls import Controls
 from surgsim.live.pace import Pace
 from surgsim.live.status import Status, status
@@ -18,7 +18,6 @@ from surgsim.simulate.setup import Setup
 from surgsim.tasks.teleoperation import Teleoperation
 from surgsim.trace.trace import Trace
 
-Array = NDArray[np.float64]
 _FRAME_S = 1.0 / 60.0
 
 

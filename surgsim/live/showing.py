@@ -6,16 +6,15 @@ from surgsim.compiled.watch import working_time
 from surgsim.live.pace import Pace
 from surgsim.recording.live import LiveView, viewer
 from surgsim.runs.folder import RunResult, check_target, result_of, write_run
-from surgsim.scenario.schema import Scenario
-from surgsim.simulate.loop import Progress, Simulation
-from surgsim.simulate.setup import prepare
+from surgsim.scenario.arms import Experiment
+from surgsim.simulate.loop import Progress, Simulation, prepared
 
 PIECE_S = 0.1
 """Simulated time between two looks [s]."""
 
 
 def run_shown(
-    scenario: Scenario,
+    scenario: Experiment,
     folder: Path,
     address: str | None,
     *,
@@ -38,11 +37,11 @@ def run_shown(
     """
     check_target(folder)
     with viewer(address) as stream:
-        setup = prepare(scenario)
+        setup = prepared(scenario)
         try:
-            began, duration, shown = working_time(), setup.task.duration_s, 0
+            began, duration, shown = working_time(), setup.duration_s, 0
             simulation, view, pace = Simulation(setup), LiveView(stream, scenario, duration), Pace()
-            ticks = max(1, round(PIECE_S / scenario.control_period_s))
+            ticks = max(1, round(PIECE_S / scenario.simulation.control_period_s))
             while not simulation.ended:
                 simulation.advance(ticks)
                 view.show(simulation.trace(shown))
@@ -54,7 +53,7 @@ def run_shown(
             trace = simulation.run()  # the stop after it
             view.show(simulation.trace(shown))
         finally:
-            setup.controller.close()
+            setup.close()
         result = result_of(trace, working_time() - began)
         view.end(trace, result.metrics)
     check_target(folder)

@@ -7,9 +7,8 @@ import warnings
 from typing import Any, Self
 
 import mujoco
-import numpy as np
-from numpy.typing import NDArray
 
+from surgsim.array import Array
 from surgsim.errors import SurgsimError
 from surgsim.live.keyboard import Keyboard
 from surgsim.live.picture import Picture, screen_axes
@@ -19,7 +18,6 @@ from surgsim.plant.truth import Truth
 from surgsim.recording.view import display
 from surgsim.simulate.setup import Setup
 
-Array = NDArray[np.float64]
 _REFRESH_S = 1.0 / 60.0
 _CLOSING_S = 10.0
 

@@ -10,8 +10,8 @@ import math
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
+from surgsim.array import Array
 from surgsim.metrics.metric import CHOICE, REPEATABILITY, STEADY_HAND, Metric, with_block
 from surgsim.trace.trace import Trace
 
@@ -19,18 +19,18 @@ CONVERGED_TIP_M = 1e-3
 CONVERGED_RCM_M = 5e-3
 
 
-def rms(values: NDArray[np.float64]) -> float:
+def rms(values: Array) -> float:
     """Root mean square."""
     return float(np.sqrt(np.mean(values**2)))
 
 
-def tip_control_error_m(trace: Trace) -> NDArray[np.float64]:
+def tip_control_error_m(trace: Trace) -> Array:
     """|p_believed - p_WTd| at every tick (rows,) [m]; NaN where the controller was not asked."""
-    errors: NDArray[np.float64] = np.linalg.norm(trace.block("tip_believed") - trace.block("tip_ref"), axis=1)
+    errors: Array = np.linalg.norm(trace.block("tip_believed") - trace.block("tip_ref"), axis=1)
     return errors
 
 
-def of_asked(reduce: Callable[[NDArray[np.float64]], float], errors: NDArray[np.float64]) -> float:
+def of_asked(reduce: Callable[[Array], float], errors: Array) -> float:
     """`reduce` of the errors [m] of the ticks in which the controller was asked, in mm; NaN without any.
 
     It is not asked in the tick in which a limit is found passed.
@@ -39,7 +39,7 @@ def of_asked(reduce: Callable[[NDArray[np.float64]], float], errors: NDArray[np.
     return 1e3 * reduce(known) if known.size else math.nan
 
 
-def largest(values: NDArray[np.float64]) -> float:
+def largest(values: Array) -> float:
     """Largest value."""
     return float(np.max(values))
 

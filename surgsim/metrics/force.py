@@ -5,13 +5,11 @@ measures it.
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
+from surgsim.array import Array
 from surgsim.metrics.accuracy import rms
 from surgsim.metrics.metric import CHOICE, FORCE_RESOLUTION, Metric
 from surgsim.trace.trace import Trace
-
-Array = NDArray[np.float64]
 
 
 def force_size(trace: Trace, block: str) -> Array:

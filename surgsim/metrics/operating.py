@@ -3,14 +3,13 @@
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from surgsim.array import Array
 from surgsim.metrics.accuracy import rms
 from surgsim.metrics.metric import CHOICE, Metric, with_block
 from surgsim.metrics.teleoperation import tip_velocity
 from surgsim.trace.trace import Trace
 
-Array = NDArray[np.float64]
 TREMOR_HZ = (8.0, 12.0)
 """Band of physiological tremor: Lakie et al., J. Physiol. 593(19), 2015."""
 _SHORTEST_S = 1.0

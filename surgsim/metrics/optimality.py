@@ -5,17 +5,15 @@ from collections.abc import Sequence
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import ValidationError
 
+from surgsim.array import Array
 from surgsim.control.self_motion import SelfMotion, SelfMotionPoint
 from surgsim.metrics.metric import CHOICE, Metric, Undefined
 from surgsim.models.arm import ArmModel
 from surgsim.models.config import SceneConfig
 from surgsim.spatial import nearest_on_line
 from surgsim.trace.trace import Trace
-
-Array = NDArray[np.float64]
 
 SAMPLES = 10
 """At how many ticks of a run mu* is sought at least."""

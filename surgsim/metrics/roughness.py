@@ -6,12 +6,10 @@ Arms that publish limits of both refuse a command beyond them, whatever its accu
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from surgsim.array import Array
 from surgsim.metrics.metric import CHOICE, Metric
 from surgsim.trace.trace import Trace
-
-Array = NDArray[np.float64]
 
 
 def torque_rates(trace: Trace) -> Array:

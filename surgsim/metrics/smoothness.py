@@ -1,14 +1,14 @@
 """Spectral arc length: how smooth a movement is."""
 
 import numpy as np
-from numpy.typing import NDArray
 
+from surgsim.array import Array
 from surgsim.metrics.metric import CHOICE, Metric
 from surgsim.trace.trace import Trace
 
 
 def sparc(
-    speed: NDArray[np.float64],
+    speed: Array,
     sample_rate_hz: float,
     *,
     pad_level: int = 4,

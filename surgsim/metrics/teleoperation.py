@@ -10,6 +10,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
+from surgsim.array import Array
 from surgsim.metrics.accuracy import rms
 from surgsim.metrics.force import largest
 from surgsim.metrics.metric import CHOICE, FORCE_RESOLUTION, REPEATABILITY, Metric, with_block
@@ -23,7 +24,6 @@ from surgsim.teleop.judgement import (
 )
 from surgsim.trace.trace import Trace
 
-Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 FREE_SLACK_M_PER_S = 1e-4
 FREE_FORCE_N = 0.1

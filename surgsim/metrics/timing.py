@@ -1,13 +1,13 @@
 """How long the controller took: processor time of its thread, whatever else the machine does."""
 
 import numpy as np
-from numpy.typing import NDArray
 
+from surgsim.array import Array
 from surgsim.metrics.metric import CHOICE, Metric
 from surgsim.trace.trace import Trace
 
 
-def _times(trace: Trace) -> NDArray[np.float64]:
+def _times(trace: Trace) -> Array:
     times = trace["control_time_s"]
     return times[np.isfinite(times)]
 

@@ -10,15 +10,14 @@ from functools import cached_property
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
+from surgsim.array import Array
 from surgsim.models.build import JointLimits, Scene, build_arm
 from surgsim.models.config import SceneConfig
 from surgsim.models.drive import Drive
 from surgsim.spatial import cross
 from surgsim.tick.arrays import Model
 
-Array = NDArray[np.float64]
 RCM_ROWS = 2
 """Rows that hold the shaft in a trocar."""
 _ALONG = 1e-9  # m, rad
@@ -116,7 +115,7 @@ class ArmModel:
     @property
     def is_angled(self) -> bool:
         """Whether the tip is not the shaft's end."""
-        return self._scene.shaft_end_site != self._scene.tip_site
+        return self._scene.is_angled
 
     @cached_property
     def p_TS(self) -> Array:

@@ -30,10 +30,10 @@ from itertools import pairwise
 import mujoco
 import numpy as np
 
+from surgsim.array import Array
 from surgsim.errors import SurgsimError
 from surgsim.models.instrument import two_rods
 from surgsim.models.named import Named
-from surgsim.spatial import Array
 
 HALVES = 2
 HINGES = 2 * HALVES

@@ -9,6 +9,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from surgsim.array import Array
 from surgsim.errors import SurgsimError
 from surgsim.models.adopted.tool import SHAFT_END
 from surgsim.models.collision import CollisionShapes, collision_shapes
@@ -83,9 +84,14 @@ class Scene:
     cannula_qpos_ids: Ids
     cannula_dof_ids: Ids
     limits: JointLimits
-    home: NDArray[np.float64] | None
+    home: Array | None
     shapes: CollisionShapes
     prefix: str = ""
+
+    @property
+    def is_angled(self) -> bool:
+        """Whether the instrument's tip is not the shaft's end."""
+        return self.shaft_end_site != self.tip_site
 
     @property
     def parts(self) -> Named:

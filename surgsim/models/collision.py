@@ -12,6 +12,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from surgsim.array import Array
 from surgsim.models.adopted.capsules import capsules_in
 from surgsim.models.adopted.collisions import ADAPTER_M, ADAPTER_RADIUS_M
 from surgsim.models.adopted.touching import NEXT_THAT_CAN_TOUCH
@@ -21,9 +22,9 @@ from surgsim.models.named import Named
 from surgsim.models.robot import joint_names, link_names
 from surgsim.models.theatre import patient_place
 
-Array = NDArray[np.float64]
 Ids = NDArray[np.intp]
 NEVER_TOUCH = "never_touch"
+BENT_PART = "bent part"
 _TABLE_CENTRE_M, _TABLE_HALF_M = (0.0, -0.13, -0.223), (0.268, 0.98, 0.054)  # pads and top of the drawn table
 
 
@@ -32,12 +33,13 @@ class CollisionShapes:
     """Where forbidden contacts are looked for.
 
     Attributes:
-        names: Of the n capsules, from the base on; with an instrument the last two are its adapter and shaft.
+        names: Of the n capsules, from the base on; with an instrument its adapter and shaft follow, and of
+            one with an angled tip its bent part, from the shaft's end to the tip, as thick as the shaft.
         bodies: The body that each is fixed to (n,).
         ends: End points in the body's frame (n, 2, 3) [m].
         radii: (n,) [m].
         pairs: Capsules that can touch each other (m, 2).
-        shaft: Row of the shaft, -1 without an instrument.
+        shaft: Row of the shaft, -1 without an instrument; what follows it goes through the port with it.
         patient: Rows: centre of the abdomen from the port, cosine and sine of its turn about the vertical
             and 0, semi-axes, centre of the table in the patient's frame, its half sizes (5, 3) [m]; (0, 3)
             without trocar.
@@ -58,13 +60,7 @@ def collision_shapes(model: Named, config: SceneConfig) -> CollisionShapes:
     bodies = ("base", *link_names(joints))
     capsules = [(name, name, *capsule) for name in bodies for capsule in _capsules(model, name)]
     if config.instrument is not None:
-        entry, tip = config.instrument.adapter_length_m, config.instrument.shaft_length_m
-        tip += entry
-        below = (0.0, 0.0, max(0.0, entry - ADAPTER_RADIUS_M))
-        capsules.append(("adapter", "instrument", np.zeros(3), np.array(below), ADAPTER_RADIUS_M))
-        radius = 0.5 * config.instrument.shaft_diameter_m
-        ends = np.array([0.0, 0.0, entry]), np.array([0.0, 0.0, tip - radius])
-        capsules.append(("shaft", "instrument", *ends, radius))
+        capsules += _of_instrument(config.instrument)
     names = tuple(name for name, *_ in capsules)
     return CollisionShapes(
         names=names,
@@ -85,6 +81,26 @@ def _capsules(model: Named, body: str) -> list[tuple[Array, Array, float]]:
     return [(*capsule.ends, capsule.radius) for capsule in found]
 
 
+def _of_instrument(instrument: InstrumentConfig) -> list[tuple[str, str, Array, Array, float]]:
+    """Name, body, end points (3,) [m] and radius [m] of the instrument's capsules."""
+    entry, tip = instrument.adapter_length_m, instrument.shaft_length_m
+    tip += entry
+    below = (0.0, 0.0, max(0.0, entry - ADAPTER_RADIUS_M))
+    radius = 0.5 * instrument.shaft_diameter_m
+    ends = np.array([0.0, 0.0, entry]), np.array([0.0, 0.0, tip - radius])
+    found = [
+        ("adapter", "instrument", np.zeros(3), np.array(below), ADAPTER_RADIUS_M),
+        ("shaft", "instrument", *ends, radius),
+    ]
+    bent = instrument.p_ST
+    length = float(np.linalg.norm(bent))
+    if length > 0.0:
+        end = np.array([0.0, 0.0, tip])
+        round_tip = end + max(0.0, 1.0 - radius / length) * bent
+        found.append((BENT_PART, "instrument", end, round_tip, radius))
+    return found
+
+
 def _left_out(model: Named, instrument: InstrumentConfig | None) -> set[tuple[str, str]]:
     """Pairs that the arm's text `never_touch` names; its adapter is a short one on the flange itself."""
     words = (model.text(NEVER_TOUCH) or "").split()
@@ -98,9 +114,11 @@ def _left_out(model: Named, instrument: InstrumentConfig | None) -> set[tuple[st
 def _pairs(names: tuple[str, ...], along: tuple[str, ...], left_out: set[tuple[str, str]]) -> Ids:
     """Capsules that are far enough apart along the chain, `along` which the parts stand.
 
-    The bent wrist holds the adapter beside the link above it, the third from the end.
+    The bent wrist holds the adapter beside the link above it, the third from the end. The bent part stands
+    with the shaft.
     """
     place = {name: i for i, name in enumerate(along)}
+    place[BENT_PART] = place["shaft"]
     near = {(along[-5], "adapter")} | left_out
     pairs = [
         (i, j)

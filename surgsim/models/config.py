@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
+import numpy as np
 from pydantic import (
     AfterValidator,
     Field,
@@ -20,6 +21,7 @@ from pydantic import (
 )
 from pydantic_core import PydanticCustomError
 
+from surgsim.array import Array
 from surgsim.catalog import PartConfig
 from surgsim.errors import SurgsimError
 from surgsim.models.adopted.arm import adopted
@@ -272,11 +274,18 @@ class InstrumentConfig(PartConfig):
         return read_tool(self._path, *sites, self.files_sha256 or "")
 
     @property
+    def p_ST(self) -> Array:
+        """The tip from the shaft's end (3,) [m], z along the shaft; zeros of a straight instrument."""
+        return self.tool.p_ST.copy() if self.of_file else np.zeros(3)
+
+    def up_to_shaft_end(self) -> "InstrumentConfig":
+        """The same with its tip at the shaft's end."""
+        return self.model_copy(update={"tip_site": self.shaft_end_site}) if self.p_ST.any() else self
+
+    @property
     def tip_from_shaft_m(self) -> tuple[float, float]:
         """How far the tip is beside the shaft's line, and past the shaft's end along it [m]."""
-        if not self.of_file:
-            return 0.0, 0.0
-        x, y, z = self.tool.p_ST
+        x, y, z = self.p_ST
         return math.hypot(x, y), float(z)
 
     def _checked_com(self) -> Self:

@@ -5,7 +5,7 @@ from collections.abc import Iterable
 import mujoco
 import numpy as np
 
-from surgsim.spatial import Array
+from surgsim.array import Array
 
 IDENTITY = np.array([1.0, 0.0, 0.0, 0.0])
 

@@ -10,10 +10,10 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from surgsim.array import Array
 from surgsim.models.picture import renderer
 from surgsim.spatial import unit
 
-Array = NDArray[np.float64]
 Picture = NDArray[np.uint8]
 
 # Processor time of a picture of 640 x 480 with 8 samples and a shadow map of 8192 is four times that without.

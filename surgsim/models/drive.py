@@ -21,13 +21,12 @@ from pathlib import Path
 from typing import Annotated, Literal, Self
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field, NonNegativeFloat, PositiveFloat
 from ruamel.yaml import YAML, YAMLError
 
+from surgsim.array import Array
 from surgsim.catalog import PartConfig
 
-Array = NDArray[np.float64]
 FILE = "drive.yaml"
 """In a robot's folder: what its real drives are."""
 Positive = PositiveFloat | tuple[PositiveFloat, ...]

@@ -3,10 +3,10 @@
 import mujoco
 import numpy as np
 
+from surgsim.array import Array
 from surgsim.models.adopted.tool import tool_spec
 from surgsim.models.config import InstrumentConfig
 from surgsim.models.graft import asset, graft
-from surgsim.spatial import Array
 
 _DRAWN_DIAMETER_M = 0.008  # the template's jaws are drawn for this shaft
 _JAWS_M = 0.018  # of the shaft's length, for an 8 mm shaft

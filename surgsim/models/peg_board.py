@@ -13,14 +13,13 @@ from dataclasses import dataclass
 from typing import Annotated, Self
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field, FiniteFloat, PositiveFloat, model_validator
 
+from surgsim.array import Array
 from surgsim.catalog import PartConfig
 from surgsim.models.config import Vec3
 from surgsim.spatial import plane_axes, unit
 
-Array = NDArray[np.float64]
 Vec2 = tuple[FiniteFloat, FiniteFloat]
 Pegs = Annotated[tuple[Vec2, ...], Field(min_length=1, max_length=12)]
 

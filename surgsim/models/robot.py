@@ -23,13 +23,13 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike
 
+from surgsim.array import Array
 from surgsim.errors import SurgsimError
 from surgsim.models.adopted.arm import adopted
 from surgsim.models.adopted.chain import FEWEST, MOST
 from surgsim.models.config import RobotConfig
 from surgsim.models.folders import LITERAL_D2, is_shipped, named_spec
 from surgsim.models.named import Named
-from surgsim.spatial import Array
 
 
 def joint_names(model: mujoco.MjModel | mujoco.MjSpec | Named) -> tuple[str, ...]:

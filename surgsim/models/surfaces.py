@@ -7,7 +7,7 @@ Grid lines run along the edges of its window, so that the rim is straight. Visua
 import numpy as np
 from numpy.typing import NDArray
 
-from surgsim.spatial import Array
+from surgsim.array import Array
 
 TABLE_M = -0.165  # height of the table's pads
 EDGE_M = 0.285  # half width at which the sheet bends down

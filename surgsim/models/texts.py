@@ -8,11 +8,9 @@ from collections.abc import Mapping
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
+from surgsim.array import Array
 from surgsim.models.arm import ArmModel
-
-Array = NDArray[np.float64]
 
 TIP = "tip"
 """Frame of the tip in the URDF, and its site in the MJCF; z is the shaft axis."""

@@ -5,10 +5,11 @@ import math
 import mujoco
 import numpy as np
 
+from surgsim.array import Array
 from surgsim.models.config import RobotConfig, SceneConfig, TrocarConfig, WallConfig
 from surgsim.models.graft import asset, graft
 from surgsim.models.surfaces import drape_mesh, inward_ellipsoid
-from surgsim.spatial import Array, unit
+from surgsim.spatial import unit
 
 GRAVITY_M_PER_S2 = 9.81
 CANNULA_JOINTS = ("cannula_x", "cannula_y", "cannula_z")

@@ -5,8 +5,8 @@ from typing import Protocol
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
+from surgsim.array import Array
 from surgsim.catalog import Surroundings
 from surgsim.columns import Block
 from surgsim.models.build import Scene
@@ -17,8 +17,6 @@ from surgsim.plant.state import State
 from surgsim.plant.truth import Truth
 from surgsim.plant.world import HookTable
 from surgsim.tick.arrays import World
-
-Array = NDArray[np.float64]
 
 
 class Plant(Protocol):

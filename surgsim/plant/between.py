@@ -7,15 +7,12 @@ from typing import Any, ClassVar
 import mujoco
 import numpy as np
 from numba import types
-from numpy.typing import NDArray
 
 from surgsim.compiled import as_parameter, compiled
 from surgsim.models.build import Scene
 from surgsim.plant.contacts import INEXACT_M, NOTHING, reaches, touching_pair
 from surgsim.tick.arrays import Record, new, type_of
 from surgsim.tick.views import vector, words
-
-Array = NDArray[np.float64]
 
 
 class Between(Record):

@@ -26,8 +26,8 @@ Own modelling; measured ranges of the parameters and their sources are in docs/p
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from surgsim.array import Array
 from surgsim.compiled import compiled
 from surgsim.models.bending import BEND_JOINTS
 from surgsim.models.config import WallConfig
@@ -37,7 +37,6 @@ from surgsim.tick.arrays import Record, World
 from surgsim.tick.scratch import scratch
 from surgsim.tick.views import body_place, doubles, vector
 
-Array = NDArray[np.float64]
 FUNNEL_LENGTH_M = 0.010
 """l_f: over this length behind the tip the shaft finds its way into the bore."""
 FUNNEL_SLOPE = 0.3

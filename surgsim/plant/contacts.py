@@ -5,8 +5,8 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
+from surgsim.array import Array
 from surgsim.compiled import compiled
 from surgsim.models.build import Scene
 from surgsim.plant.truth import Contact
@@ -18,7 +18,6 @@ from surgsim.tick.views import doubles, vector, words
 if TYPE_CHECKING:
     from surgsim.plant.between import Between
 
-Array = NDArray[np.float64]
 
 SKIN_MARGIN_M = 0.1
 """How far from the port the shaft may pass the skin; nearer is the RCM limit's matter."""
@@ -42,7 +41,7 @@ class Watch(Record):
         nbody: Bodies.
         count: Capsules.
         pair_count: Pairs.
-        shaft: The shaft's capsule, or -1.
+        shaft: The shaft's capsule, or -1; what follows it is in the patient with it.
         has_patient: 1 with a port, else 0.
         clearance: Room at the last look [m]: nothing touches until so much of it is used up.
         patient: Rows of the patient's and the table's numbers (5, 3).
@@ -174,10 +173,12 @@ def is_clear(watch: Watch, world: World) -> bool:
     if not watch.has_patient or watch.shaft < 0:
         return True
     ends = doubles(watch.ends, 2 * watch.count, 3)
-    _place(watch, watch.shaft, ends)
-    _into_patient(watch, watch.shaft, world.p_WC, ends)
-    beside: float = skin_distance(ends[2 * watch.shaft], ends[2 * watch.shaft + 1], watch.patient)
-    return not beside > SKIN_MARGIN_M
+    for i in range(watch.shaft, watch.count):
+        _place(watch, i, ends)
+        _into_patient(watch, i, world.p_WC, ends)
+        if skin_distance(ends[2 * i], ends[2 * i + 1], watch.patient) > SKIN_MARGIN_M:
+            return False
+    return True
 
 
 @compiled
@@ -239,15 +240,15 @@ def forbidden_contact(watch: Watch, p_WC: Array) -> tuple[int, int, float, float
         if gap < 0.0:
             return i, _TABLE, -gap, 0.0
         room = min(room, gap)
-        if i != shaft:
+        if i < shaft or shaft < 0:
             gap = body_gap(p0, p1, radii[i], patient[2])
             if gap < 0.0:
                 return i, _BODY, -gap, 0.0
             room = min(room, gap)
-    if shaft >= 0:
-        beside = skin_distance(ends[2 * shaft], ends[2 * shaft + 1], patient)
+    for i in range(shaft if shaft >= 0 else watch.count, watch.count):
+        beside = skin_distance(ends[2 * i], ends[2 * i + 1], patient)
         if beside > SKIN_MARGIN_M:
-            return shaft, _SKIN, beside, 0.0
+            return i, _SKIN, beside, 0.0
     return 0, NOTHING, 0.0, room
 
 

@@ -34,8 +34,8 @@ from typing import Any
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
+from surgsim.array import Array
 from surgsim.columns import joints, scalar
 from surgsim.compiled import compiled
 from surgsim.models.build import Scene
@@ -53,7 +53,6 @@ from surgsim.tick.scratch import scratch, scratch_matrix
 from surgsim.tick.status import GOES_ON, RANK_LOST, TORQUE_RATE
 from surgsim.tick.views import vector
 
-Array = NDArray[np.float64]
 LOOP_S = 1e-4
 """Period of the torque loop, and longest substep [s]."""
 LAST = 10

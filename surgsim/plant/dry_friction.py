@@ -1,13 +1,10 @@
 """Dry friction of joints that are coupled by their inertia, within a step."""
 
-import numpy as np
-from numpy.typing import NDArray
-
+from surgsim.array import Array
 from surgsim.compiled import compiled
 from surgsim.tick.algebra import back_substitute, factor
 from surgsim.tick.scratch import scratch, scratch_matrix
 
-Array = NDArray[np.float64]
 _SWEEPS, _ROUNDS = 6, 60
 _ROUNDING = 1e-9
 

@@ -8,6 +8,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from surgsim.array import Array
 from surgsim.catalog import PartConfig
 from surgsim.columns import Block, scalar, width
 from surgsim.columns import vector as vector_columns
@@ -40,7 +41,6 @@ from surgsim.tick.arrays import World
 from surgsim.tick.status import GOES_ON
 from surgsim.tick.views import vector
 
-Array = NDArray[np.float64]
 _FIRST_PART = 2
 """Own columns and the ledger stand before the parts."""
 

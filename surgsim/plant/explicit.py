@@ -1,15 +1,12 @@
 """Laws of contact that act as a force of their own, not through MuJoCo's solver; and what they may be."""
 
 import mujoco
-import numpy as np
-from numpy.typing import NDArray
 
 from surgsim.compiled import compiled
 from surgsim.errors import SurgsimError
 from surgsim.models.build import Scene
 from surgsim.plant.shaft import bend_joints, lateral_masses, piece_lengths
 
-Array = NDArray[np.float64]
 FADE_M = 0.0005
 """d_0: damping fades in over this depth, so that the force is continuous at touch."""
 LIGHTEST_TIP_KG = 0.2

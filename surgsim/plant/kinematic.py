@@ -5,8 +5,8 @@ from typing import Literal
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
+from surgsim.array import Array
 from surgsim.catalog import PartConfig
 from surgsim.columns import Block
 from surgsim.compiled import address_of, as_parameter, compiled
@@ -15,7 +15,7 @@ from surgsim.plant.base import Plant
 from surgsim.plant.bore import Bore
 from surgsim.plant.contacts import ContactWatch
 from surgsim.plant.part import PlantPart
-from surgsim.plant.period import see_arm
+from surgsim.plant.period import COMMANDED, SEEN, see_arm
 from surgsim.plant.records import world_of
 from surgsim.plant.state import State
 from surgsim.plant.truth import Truth
@@ -24,8 +24,6 @@ from surgsim.tick.arrays import World, new
 from surgsim.tick.mujoco_calls import mj_kinematics
 from surgsim.tick.status import GOES_ON
 from surgsim.tick.views import vector
-
-Array = NDArray[np.float64]
 
 
 class KinematicPlantConfig(PartConfig):
@@ -53,20 +51,36 @@ def look_at_kinematics(world: World) -> None:
 
 
 @compiled
-def advance_kinematics(world: World, bore: Bore, hooks: Hooks) -> int:
-    """q(k+1) = q(k) + T q'(k), eq. (5) of the manipulability paper; torque and jaws do nothing."""
+def integrate(world: World) -> None:
+    """q(k+1) = q(k) + T q'(k), eq. (5) of the manipulability paper."""
     qpos, qvel = vector(world.qpos, world.nq), vector(world.qvel, world.nv)
     world.tick += 1
     world.t_s = world.tick * world.dt_s
     for i in range(world.q.size):
         qpos[world.first_qpos + i] += world.dt_s * world.qdot[i]
         qvel[world.first_dof + i] = world.qdot[i]
+
+
+@compiled
+def advance_kinematics(world: World, bore: Bore, hooks: Hooks) -> int:
+    """A control period, see `integrate`; torque and jaws do nothing."""
+    integrate(world)
     look_at_kinematics(world)
     return GOES_ON
 
 
+@compiled
+def of_several_kinematic(stage: int, k: int, world: World, bore: Bore, hooks: Hooks) -> int:
+    """A stage of the period for one of several arms; between two the model is placed for all."""
+    if stage == COMMANDED:
+        integrate(world)
+    elif stage == SEEN:
+        see_arm(world)
+    return GOES_ON
+
+
 class KinematicPlant:
-    """Follows the resolver's joint velocities exactly.
+    """Follows the resolver's joint velocities exactly. One of several arms is given the data that all share.
 
     Attributes:
         world: The arrays of the plant.
@@ -76,15 +90,20 @@ class KinematicPlant:
 
     columns: tuple[Block, ...] = ()
 
-    def __init__(self, scene: Scene, control_period_s: float) -> None:
+    def __init__(self, scene: Scene, control_period_s: float, *, data: mujoco.MjData | None = None) -> None:
         self._scene = scene
-        self._data = mujoco.MjData(scene.model)
+        self._data = mujoco.MjData(scene.model) if data is None else data
         n = len(scene.dof_ids)
         self.world, self.bore = world_of(scene, self._data, control_period_s), new(Bore, n)
         self.hooks = HookTable((), (), n, self.world)
         self._advance = as_parameter(advance_kinematics, advance_signature(n))
         self.advance = address_of(advance_kinematics, advance_signature(n))
         self.watch = ContactWatch(scene, self._data)
+
+    @property
+    def scene(self) -> Scene:
+        """The scene of its arm."""
+        return self._scene
 
     @property
     def data(self) -> mujoco.MjData:
@@ -104,10 +123,18 @@ class KinematicPlant:
     def reset(self, q: Array) -> State:
         """Put the arm at rest at joint positions `q` (n,) [rad]."""
         mujoco.mj_resetData(self._scene.model, self._data)
-        self.world.tick, self.world.t_s = 0, 0.0
-        self._data.qpos[self._scene.qpos_ids] = q
+        self.pose(q)
+        self.forget()
         look_at_kinematics(self.world)
         return self.state()
+
+    def pose(self, q: Array) -> None:
+        """Put the arm at joint positions `q` (n,) [rad]; nothing looks at it yet."""
+        self._data.qpos[self._scene.qpos_ids] = q
+
+    def forget(self) -> None:
+        """Forget the last run."""
+        self.world.tick, self.world.t_s = 0, 0.0
 
     def step(self, torque: Array, qdot: Array, jaw: float = 0.0) -> State:
         """Move with velocity `qdot` (n,) [rad/s] for one control period; torque and jaws do nothing."""

@@ -21,10 +21,11 @@ from typing import ClassVar
 import mujoco
 import numpy as np
 
+from surgsim.array import Array
 from surgsim.compiled import compiled
 from surgsim.models.build import Scene
 from surgsim.plant.bore import Bore, Push
-from surgsim.tick.arrays import Array, Record, World
+from surgsim.tick.arrays import Record, World
 from surgsim.tick.mujoco_calls import mj_mulM
 from surgsim.tick.overlay import laid_over, overlay
 from surgsim.tick.python_part import PythonPart, enter
@@ -38,7 +39,10 @@ _PLACE, _STIFFNESS, _REST, _SPRING = range(4)
 
 
 class Law(Record):
-    """Numbers of the ledger; after it in the gains the damping (nv,), weights (nbody, 3) [N], springs (k, 3).
+    """Numbers of the ledger.
+
+    After it in the gains stand the damping (nv,), which degrees of freedom are the arm's (nv,), 1 or 0, the
+    weights (nbody, 3) [N], and the springs (k, 3).
 
     Attributes:
         actuator: Address of `qfrc_actuator`; as the following four of MuJoCo's arrays.
@@ -137,7 +141,13 @@ def _rows(memory: Array, nv: int) -> Array:
 @compiled
 def _springs(gains: Array, world: World) -> Array:
     """The springs (k, 3)."""
-    return gains[LAW_SIZE + world.nv + 3 * world.nbody :].reshape(-1, _SPRING)
+    return gains[LAW_SIZE + 2 * world.nv + 3 * world.nbody :].reshape(-1, _SPRING)
+
+
+@compiled
+def _own(gains: Array, world: World) -> Array:
+    """Which degrees of freedom are the arm's (nv,), 1 or 0."""
+    return gains[LAW_SIZE + world.nv : LAW_SIZE + 2 * world.nv]
 
 
 @compiled
@@ -145,8 +155,9 @@ def before_step(gains: Array, world: World, memory: Array, out: Array) -> int:
     """Call when positions, velocities and all forces of the instant are set, before `mj_step2`."""
     law, rows = gains[:LAW_SIZE].view(LAW)[0], _rows(memory, world.nv)
     qvel, qpos = vector(world.qvel, world.nv), vector(world.qpos, world.nq)
+    own = _own(gains, world)
     for i in range(world.nv):
-        rows[_BEFORE, i] = qvel[i]
+        rows[_BEFORE, i] = own[i] * qvel[i]
     springs, stretch = _springs(gains, world), memory[STATE_SIZE + _ROWS * world.nv :]
     for k in range(law.springs):
         stretch[k] = qpos[int(springs[k, _PLACE])] - springs[k, _REST]
@@ -242,14 +253,15 @@ def _add_work(law: Law, world: World, memory: Array, state: State) -> None:
 def _read_energy(gains: Array, law: Law, world: World, memory: Array, state: State) -> None:
     """Energies at the instant before the step: M and positions are still its."""
     nv, rows, qvel = world.nv, _rows(memory, world.nv), vector(world.qvel, world.nv)
+    own = _own(gains, world)
     for i in range(nv):
-        rows[_MEAN, i] = 0.5 * (rows[_BEFORE, i] + qvel[i])
+        rows[_MEAN, i] = 0.5 * (rows[_BEFORE, i] + own[i] * qvel[i])
     mean, momentum = rows[_MEAN], rows[_MOMENTUM]
     mj_mulM(world.mj_model, world.mj_data, momentum.ctypes.data, mean.ctypes.data)
     kinetic = potential = elastic = 0.0
     for i in range(nv):
         kinetic += momentum[i] * mean[i]
-    weights, places = gains[LAW_SIZE + nv :], vector(world.xipos, 3 * world.nbody)
+    weights, places = gains[LAW_SIZE + 2 * nv :], vector(world.xipos, 3 * world.nbody)
     for i in range(places.size):
         potential += weights[i] * places[i]
     springs, stretch = _springs(gains, world), memory[STATE_SIZE + _ROWS * nv :]
@@ -286,6 +298,11 @@ def fill_terms(gains: Array, world: World, memory: Array, out: Array) -> int:
     return GOES_ON
 
 
+def _roots(model: mujoco.MjModel) -> list[str]:
+    """Of every body the name of the one that its tree hangs on."""
+    return [str(model.body(root).name) for root in model.body_rootid]
+
+
 class EnergyLedger:
     """Energies and works since `start`, in joules: `before_step`, `after_step` and `fill_terms`.
 
@@ -295,6 +312,9 @@ class EnergyLedger:
     seal) are positive when energy leaves. `contact_work` is what the bore's contact and all of MuJoCo's
     constraints but dry friction put in. `contact_stored`, for information, is the elastic energy of bore and
     seal: the part of contact_work and friction_loss that can come back.
+
+    One of several arms in a model has a ledger of its own: the velocities of the others' joints are left out,
+    and between their inertias there is no coupling.
 
     Dry friction of joints is one of MuJoCo's constraints, whose rows lie elsewhere at every step: only where
     there is some, it is looked up in Python.
@@ -326,20 +346,22 @@ class EnergyLedger:
         model = scene.model
         self._model, self._data, self._friction = model, data, np.zeros(model.nv)
         self._entered = PythonPart(self._find_friction)
-        springs = np.flatnonzero(model.jnt_stiffness)
+        mine = np.array([name.startswith(scene.prefix) for name in _roots(model)])
+        springs = np.flatnonzero(np.array(model.jnt_stiffness) * mine[model.jnt_bodyid])
         places = model.jnt_qposadr[springs]
         table = np.column_stack(
             [places.astype(float), np.array(model.jnt_stiffness[springs]), model.qpos_spring[places]]
         )
-        weights = -np.outer(model.body_mass, model.opt.gravity).ravel()
+        weights = -np.outer(np.array(model.body_mass) * mine, model.opt.gravity).ravel()
+        own = mine[model.dof_bodyid].astype(float)
         damping = np.array(model.dof_damping).reshape(-1)
-        self.gains = np.concatenate([np.zeros(LAW_SIZE), damping, weights, table.ravel()])
+        self.gains = np.concatenate([np.zeros(LAW_SIZE), damping, own, weights, table.ravel()])
         self.memory = np.zeros(STATE_SIZE + _ROWS * model.nv + len(springs))
         law = laid_over(Law, self.gains)
         for name in ("actuator", "smooth", "passive", "constraint", "spring"):
             law[name] = getattr(data, f"qfrc_{name}").ctypes.data
         law.friction, law.entry[:] = self._friction.ctypes.data, self._entered.gains
-        law.rubs, law.springs = bool(np.any(model.dof_frictionloss)), len(springs)
+        law.rubs, law.springs = bool(np.any(model.dof_frictionloss * own)), len(springs)
         law.h = model.opt.timestep
         if bore is None or scene.wall is None:
             return

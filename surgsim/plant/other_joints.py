@@ -8,7 +8,6 @@ from surgsim.columns import AXES, Block, scalar, vector
 from surgsim.models.named import Named
 from surgsim.models.robot import joint_names
 
-Array = NDArray[np.float64]
 QUATERNION = ("w", "x", "y", "z")
 
 

@@ -6,14 +6,13 @@ from typing import Any, Protocol
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
+from surgsim.array import Array
 from surgsim.catalog import Surroundings
 from surgsim.columns import Block
 from surgsim.models.build import Scene
 from surgsim.plant.state import State
 
-Array = NDArray[np.float64]
 BLOCK_TICKS = 1024
 """Parts may draw their noise for so many ticks at once, from a multiple of it on."""
 

@@ -7,14 +7,12 @@ MuJoCo's own contacts, and figures, are in docs/physical_port.md.
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
+from surgsim.array import Array
 from surgsim.models.build import Scene, span
 from surgsim.plant.bore import Bore, Push, law
 from surgsim.plant.shaft import bend_joints
 from surgsim.tick.arrays import new
-
-Array = NDArray[np.float64]
 
 
 def new_bore(scene: Scene) -> Bore:

@@ -7,11 +7,12 @@ from typing import Any, ClassVar
 import mujoco
 import numpy as np
 from numba import types
-from numpy.typing import NDArray
 
+from surgsim.array import Array
 from surgsim.compiled import address_of, as_parameter, call_at, compiled
 from surgsim.errors import SurgsimError
 from surgsim.plant.dynamic import DynamicPlant
+from surgsim.plant.kinematic import KinematicPlant, of_several_kinematic
 from surgsim.plant.period import (
     CLEARED,
     COMMANDED,
@@ -25,11 +26,12 @@ from surgsim.plant.period import (
     stage_signature,
 )
 from surgsim.tick.arrays import Record, new, type_of
-from surgsim.tick.mujoco_calls import mj_step1, mj_step2
+from surgsim.tick.mujoco_calls import mj_kinematics, mj_step1, mj_step2
 from surgsim.tick.status import GOES_ON
 from surgsim.tick.views import place_of, record_at, words
 
-Array = NDArray[np.float64]
+SharedPlant = DynamicPlant | KinematicPlant
+"""A plant that can share its model with others."""
 _ENTRY = 4
 
 
@@ -43,6 +45,7 @@ class Shared(Record):
             (count, 4).
         count: Arms.
         substeps: Physics steps in a control period.
+        kinematic: Whether arms follow velocities, and no physics are stepped.
         who: The arm whose part was the last to tell a status that does not go on.
     """
 
@@ -52,6 +55,7 @@ class Shared(Record):
     table: int
     count: int
     substeps: int
+    kinematic: int
     who: int
 
 
@@ -86,6 +90,9 @@ def _move_ports(shared: Shared, k: int) -> int:
 @compiled
 def begin_several(shared: Shared) -> int:
     """The first instant of a run, as `surgsim.plant.period.begin`."""
+    if shared.kinematic:
+        mj_kinematics(shared.mj_model, shared.mj_data)
+        return _all(shared, SEEN, 0)
     status = _move_ports(shared, 0)
     if status != GOES_ON:
         return status
@@ -95,8 +102,14 @@ def begin_several(shared: Shared) -> int:
 
 @compiled
 def advance_several(shared: Shared) -> int:
-    """Let every arm's torques act for one control period, as `surgsim.plant.period.advance_dynamics`."""
+    """Let every arm's commands act for one control period, as `surgsim.plant.period.advance_dynamics`.
+
+    Where arms follow velocities it is as `surgsim.plant.kinematic.advance_kinematics`.
+    """
     status = _all(shared, COMMANDED, 0)
+    if shared.kinematic:
+        mj_kinematics(shared.mj_model, shared.mj_data)
+        return _all(shared, SEEN, 0)
     for k in range(shared.substeps):
         if k > 0 and status == GOES_ON:
             status = _move_ports(shared, k)
@@ -117,13 +130,13 @@ class SeveralPlants:
     """The plants of arms that share a model.
 
     Args:
-        plants: One for each arm, all on the same data.
+        plants: One for each arm, all on the same data and of one kind.
 
     Attributes:
         record: What the kernels work on.
     """
 
-    def __init__(self, plants: Sequence[DynamicPlant]) -> None:
+    def __init__(self, plants: Sequence[SharedPlant]) -> None:
         self._plants = tuple(plants)
         first = self._plants[0]
         self._model, self._data = first.scene.model, first.data
@@ -131,7 +144,7 @@ class SeveralPlants:
         self.record = shared = new(Shared, 0)
         shared.mj_model, shared.mj_data = self._model._address, self._data._address
         shared.table, shared.count = self._table.ctypes.data, len(self._plants)
-        shared.substeps = first.world.substeps
+        shared.substeps, shared.kinematic = first.world.substeps, isinstance(first, KinematicPlant)
         self._begin = as_parameter(begin_several, shared_signature())
 
     def reset(self, starts: Sequence[Array]) -> None:
@@ -154,6 +167,7 @@ class SeveralPlants:
         return next((error for plant in self._plants if (error := plant.hooks.raised())), None)
 
 
-def _entry(plant: DynamicPlant) -> list[int]:
-    kernel = address_of(of_several, stage_signature(plant.world.q.size))
+def _entry(plant: SharedPlant) -> list[int]:
+    stages = of_several_kinematic if isinstance(plant, KinematicPlant) else of_several
+    kernel = address_of(stages, stage_signature(plant.world.q.size))
     return [kernel, *(place_of(record) for record in (plant.world, plant.bore, plant.hooks.record))]

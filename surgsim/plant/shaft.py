@@ -7,8 +7,8 @@ are the same, so that the distance to the shaft does not jump. Of a stiff shaft 
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
+from surgsim.array import Array
 from surgsim.compiled import compiled
 from surgsim.models.bending import BEND_JOINTS, bends, piece_end
 from surgsim.models.build import Scene
@@ -17,7 +17,6 @@ from surgsim.tick.arrays import World
 from surgsim.tick.scratch import scratch
 from surgsim.tick.views import doubles, site_place
 
-Array = NDArray[np.float64]
 _LEAST = 1e-12
 
 

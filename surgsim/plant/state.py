@@ -3,9 +3,9 @@
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from surgsim.array import Array
+
 NO_FORCE = np.zeros(3)
 NO_FORCE.flags.writeable = False
 NO_PLACE, NO_TURN = np.full(3, np.nan), np.full((3, 3), np.nan)

@@ -3,9 +3,9 @@
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from surgsim.array import Array
+
 NOWHERE = np.full(3, np.nan)
 NOWHERE.flags.writeable = False
 NO_VALUES = np.zeros(0)

@@ -10,8 +10,8 @@ import numba
 import numpy as np
 from numba import types
 from numba.extending import is_jitted
-from numpy.typing import NDArray
 
+from surgsim.array import Array
 from surgsim.compiled import address_of, call_at, compiled
 from surgsim.errors import SurgsimError
 from surgsim.models.build import Scene
@@ -22,8 +22,6 @@ from surgsim.tick.arrays import Numbers, Record, World, hook_signature, new, poi
 from surgsim.tick.python_part import PythonPart, first_raised, python_kernel
 from surgsim.tick.status import GOES_ON
 from surgsim.tick.views import vector, words
-
-Array = NDArray[np.float64]
 
 KINDS = ("actuate", "grip", "port_motion", "push", "before_step", "after_step", "sense", "values")
 ACTUATE, GRIP, PORT_MOTION, PUSH, BEFORE_STEP, AFTER_STEP, SENSE, VALUES = range(len(KINDS))

@@ -3,7 +3,7 @@
 import hashlib
 import re
 import shlex
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -12,9 +12,10 @@ from surgsim.control.controller import ControllerConfig
 from surgsim.control.external.given import given
 from surgsim.control.policies.registry import policy_names
 from surgsim.errors import ScenarioError, SurgsimError, unknown_name
+from surgsim.packages import MissingPackageError
 from surgsim.protocol.canonical import sha256_of
-from surgsim.protocol.definition import Protocol, TrackConfig, with_scheme
-from surgsim.runs.parts import external_names
+from surgsim.protocol.definition import Protocol, TrackConfig, entry_file, entry_label, with_scheme
+from surgsim.runs.parts import external_names, missing_package
 from surgsim.scenario.load import find, load_controller, shipped
 
 ANY = "*"
@@ -112,6 +113,29 @@ def check_entry(name: str, track: TrackConfig, config: ControllerConfig) -> None
     """
     if reason := refusal(track, config):
         raise SurgsimError(f"{config.name} may not enter track '{name}': {reason}")
+
+
+def check_entries(protocol: Protocol, tracks: Sequence[str]) -> None:
+    """Refuse tracks with an entry that cannot run here, before the first one does.
+
+    Raises:
+        MissingPackageError: With every such entry, what it needs, and the tracks that have none.
+    """
+    lines = {
+        (track, entry_label(entry)): line
+        for track in tracks
+        for entry in protocol.track(track).entries
+        if (line := missing_package(load_controller(entry_file(entry))))
+    }
+    if not lines:
+        return
+    entries = "; ".join(
+        f"{', '.join(f'{track}/{name}' for (track, name), its in lines.items() if its == line)}: {line}"
+        for line in dict.fromkeys(lines.values())
+    )
+    others = [track for track in protocol.config.tracks if track not in {track for track, _ in lines}]
+    otherwise = f"; --track {' or '.join(others)} can be run" if others and len(tracks) > 1 else ""
+    raise MissingPackageError(f"not every entry of {protocol.name} can be run here: {entries}{otherwise}")
 
 
 def refusal(track: TrackConfig, config: ControllerConfig) -> str:

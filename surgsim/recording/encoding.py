@@ -16,6 +16,8 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
+from surgsim.array import Array
+
 Integers = NDArray[np.int64]
 
 _WORD = np.dtype("<i8")
@@ -26,7 +28,7 @@ _WINDOW_ROWS = 256
 _LEVEL = 1
 
 
-def encode(data: NDArray[np.float64]) -> bytes:
+def encode(data: Array) -> bytes:
     """Pack `data` (rows, columns) without loss: a byte for each column's order, then the zstd stream."""
     values = np.ascontiguousarray(data.T, dtype="<f8").view(_WORD)
     orders = _orders(values)
@@ -36,7 +38,7 @@ def encode(data: NDArray[np.float64]) -> bytes:
     return orders.tobytes() + bytes(_codec().compress(planes.data, asbytes=True))
 
 
-def decode(packed: bytes, rows: int, columns: int) -> NDArray[np.float64]:
+def decode(packed: bytes, rows: int, columns: int) -> Array:
     """The array (rows, columns) that `encode` packed.
 
     Raises:

@@ -13,10 +13,10 @@ import numpy as np
 import pyarrow as pa
 from rerun.chunk import RrdReader
 
+from surgsim.array import Array
 from surgsim.errors import RecordingError
 from surgsim.recording.encoding import decode
 from surgsim.recording.layout import APPLICATION, COLUMNS, HEADER, SEAL, Header, check_version, seal
-from surgsim.trace.trace import Array
 
 
 def main(file: Path) -> None:

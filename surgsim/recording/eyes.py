@@ -4,11 +4,12 @@ import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
+from surgsim.array import Array
 from surgsim.recording.layout import SCENE
 from surgsim.recording.scene import ACTUAL_PATH, DESIRED_PATH, RCM_ARROW_SCALE
 from surgsim.scenario.arms import Experiment, each_arm
 from surgsim.spatial import unit
-from surgsim.trace.trace import Array, Trace
+from surgsim.trace.trace import Trace
 
 # Eye from the focus [m]; x points from the robot's base to the trocar, y to its left.
 _EYE_M = np.array([-0.38, -0.93, 0.58])
@@ -53,8 +54,9 @@ def inside_view(scenario: Experiment, trace: Trace, *, below: str = "") -> rrb.S
         line_grid=not scenario.theatre,
         eye_controls=_eye(eye, middle),
         overrides={
-            f"{scene}/{DESIRED_PATH}": rr.LineStrips3D.from_fields(radii=rr.Radius.ui_points(3.5)),
-            f"{scene}/{ACTUAL_PATH}": rr.LineStrips3D.from_fields(radii=rr.Radius.ui_points(1.5)),
+            f"{scene}/{of}{path}": rr.LineStrips3D.from_fields(radii=rr.Radius.ui_points(points))
+            for of in ([f"{arm}/" for arm in trace.arms] or [""])
+            for path, points in ((DESIRED_PATH, 3.5), (ACTUAL_PATH, 1.5))
         },
     )
 

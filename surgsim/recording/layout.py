@@ -7,8 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from surgsim.array import Array
 from surgsim.columns import Block
-from surgsim.trace.trace import Array, Trace, TraceMeta
+from surgsim.trace.trace import Trace, TraceMeta
 
 APPLICATION = "surgsim"
 SCHEMA_VERSION = 3

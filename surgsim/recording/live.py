@@ -3,22 +3,33 @@
 import socket
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import dataclass, field
 
 import numpy as np
 import rerun as rr
 
+from surgsim.array import Array
 from surgsim.errors import SurgsimError
+from surgsim.recording.below import by_arm
 from surgsim.recording.blueprint import blueprint
 from surgsim.recording.layout import APPLICATION
-from surgsim.recording.scene import log_paths, log_points, log_poses, log_shapes, rebuild, sampled_rows
+from surgsim.recording.scene import log_paths, log_points, log_poses, log_shapes, rebuild_all, sampled_rows
 from surgsim.recording.signals import log_signals
 from surgsim.recording.view import display
 from surgsim.recording.write import log_texts, recording_name
-from surgsim.scenario.schema import Scenario
-from surgsim.trace.trace import Array, Trace
+from surgsim.scenario.arms import Experiment
+from surgsim.trace.trace import Trace
 
 _LAID_OUT_AFTER_S = 0.5
 _CONNECT_S = 5.0
+
+
+@dataclass
+class _Paths:
+    """Desired and actual way of a tip so far, piece by piece, each (rows, 3) [m]."""
+
+    desired: list[Array] = field(default_factory=list)
+    actual: list[Array] = field(default_factory=list)
 
 
 class LiveView:
@@ -33,14 +44,13 @@ class LiveView:
         duration_s: How long that takes at most [s].
     """
 
-    def __init__(self, stream: rr.RecordingStream, scenario: Scenario, duration_s: float) -> None:
+    def __init__(self, stream: rr.RecordingStream, scenario: Experiment, duration_s: float) -> None:
         self._stream, self._scenario, self._duration_s = stream, scenario, duration_s
-        self._scene = rebuild(scenario)
-        self._desired: list[Array] = []
-        self._actual: list[Array] = []
+        self._scenes = rebuild_all(scenario)
+        self._paths = [_Paths() for _ in self._scenes]
         self._laid_out = False
         stream.send_recording_name(recording_name(scenario))
-        self._bodies = log_shapes(stream, self._scene)
+        self._bodies = log_shapes(stream, self._scenes[0])
 
     def show(self, piece: Trace) -> None:
         """Show further rows of the run."""
@@ -51,12 +61,15 @@ class LiveView:
             self._laid_out = True
         rate = self._scenario.recording.scene_rate_hz * piece.meta.control_period_s
         rows = sampled_rows(len(piece), rate)
-        log_signals(self._stream, piece)
-        log_poses(self._stream, (self._scene,), self._bodies, piece, rows, goes_on=True)
-        log_points(self._stream, piece, rows)
-        self._desired.append(piece.block("tip_ref")[rows])
-        self._actual.append(piece.block("tip")[rows])
-        log_paths(self._stream, np.concatenate(self._desired), np.concatenate(self._actual))
+        log_poses(self._stream, self._scenes, self._bodies, piece, rows, goes_on=True)
+        arms = zip(self._scenes, self._paths, by_arm(self._stream, piece), strict=True)
+        for scene, paths, (stream, one) in arms:
+            log_signals(stream, one)
+            log_points(self._stream, one, rows, scene)
+            paths.desired.append(one.block("tip_ref")[rows])
+            paths.actual.append(one.block("tip")[rows])
+            desired, actual = np.concatenate(paths.desired), np.concatenate(paths.actual)
+            log_paths(self._stream, desired, actual, scene.prefix)
 
     def end(self, trace: Trace, metrics: Mapping[str, float | None]) -> None:
         """Show how the run ended, in the layout of its recording."""

@@ -6,7 +6,8 @@ from pathlib import Path
 import numpy as np
 import rerun.blueprint as rrb
 
-from surgsim.recording.below import Below
+from surgsim.array import Array
+from surgsim.recording.below import Below, by_arm
 from surgsim.recording.blueprint import laid_out, texts_view
 from surgsim.recording.eyes import inside_view, scene_view
 from surgsim.recording.layout import series_path
@@ -16,7 +17,7 @@ from surgsim.recording.scene import log_scene, scenario_of
 from surgsim.recording.signals import log_signals
 from surgsim.recording.stream import stream_to
 from surgsim.recording.write import log_texts
-from surgsim.trace.trace import Array, Trace
+from surgsim.trace.trace import Trace
 
 _SIDES = ("a", "b")
 _MARGIN = 0.05  # above and below the signals, as a share of their range
@@ -33,7 +34,8 @@ def write_pair(path: Path, pair: Sequence[Recorded]) -> None:
         stream.send_recording_name(" | ".join(title(trace) for trace in traces))
         for side, recorded in zip(_SIDES, pair, strict=True):
             below, trace = Below(stream, side), recorded.trace
-            log_signals(below, trace)
+            for where, one in by_arm(below, trace):
+                log_signals(where, one)
             log_scene(below, scenario_of(trace), trace)
             log_texts(below, trace.meta, recorded.metrics)
 
@@ -45,8 +47,9 @@ def title(trace: Trace) -> str:
 
 
 def _blueprint(traces: Sequence[Trace]) -> rrb.Blueprint:
-    errors = common_axis([1e3 * trace[name] for trace in traces for name in ("tip_error_m", "rcm_error_m")])
-    manipulability = common_axis([trace["manipulability"] for trace in traces])
+    each = [one for trace in traces for one in trace.each()]
+    errors = common_axis([1e3 * one[name] for one in each for name in ("tip_error_m", "rcm_error_m")])
+    manipulability = common_axis([one["manipulability"] for one in each])
     columns = [
         _column(f"{side}/", trace, errors, manipulability) for side, trace in zip(_SIDES, traces, strict=True)
     ]
@@ -68,17 +71,28 @@ def _column(
 ) -> rrb.Vertical:
     """Scene, errors, manipulability, torques and texts of one run."""
     scenario = scenario_of(trace)
+    named = list(zip(trace.arms or ("",), trace.each(), strict=True))
+    rows = [_signals(below, arm, one, errors, manipulability) for arm, one in named]
+    arm, most = max(named, key=lambda each: each[1].joints)
     return rrb.Vertical(
         rrb.Horizontal(
             scene_view(scenario, trace, below=below, name=title(trace)),
             inside_view(scenario, trace, below=below),
         ),
-        rrb.Horizontal(
-            errors_plot(below, errors),
-            plot("Manipulability", f"{below}{series_path('manipulability')}", axis_y=manipulability),
-            joint_plots(trace, below)[-1],
-        ),
-        joint_key(trace.joints, below),
+        *rows,
+        joint_key(most.joints, f"{below}{arm}/" if arm else below),
         texts_view(below),
-        row_shares=[0.42, 0.27, 0.07, 0.24],
+        row_shares=[0.42, *(0.27 / len(rows) for _ in rows), 0.07, 0.24],
+    )
+
+
+def _signals(
+    side: str, arm: str, trace: Trace, errors: rrb.ScalarAxis | None, manipulability: rrb.ScalarAxis | None
+) -> rrb.Horizontal:
+    """Errors, manipulability and torques of an arm of one run."""
+    below, of = (f"{side}{arm}/", f"{arm}: ") if arm else (side, "")
+    return rrb.Horizontal(
+        errors_plot(below, errors, name=f"{of}Tip blue, RCM orange [mm]"),
+        plot(f"{of}Manipulability", f"{below}{series_path('manipulability')}", axis_y=manipulability),
+        joint_plots(trace, below)[-1],
     )

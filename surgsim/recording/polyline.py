@@ -3,8 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from surgsim.array import Array
 from surgsim.compiled import compiled
-from surgsim.trace.trace import Array
 
 TOLERANCE = 1e-3
 """Largest distance of the drawn line from a row that is left out, as a share of the signal's range."""

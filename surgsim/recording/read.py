@@ -9,12 +9,13 @@ from pathlib import Path
 
 import numpy as np
 
+from surgsim.array import Array
 from surgsim.errors import RecordingError
 from surgsim.packages import RECORDING, require
 from surgsim.recording.framing import check_framing, recording_file
 from surgsim.recording.layout import Header
 from surgsim.resources import run_module
-from surgsim.trace.trace import Array, Trace, base_blocks
+from surgsim.trace.trace import Trace, base_blocks
 
 _TIMEOUT_S = 120.0
 

@@ -7,6 +7,7 @@ import mujoco
 import numpy as np
 import rerun as rr
 
+from surgsim.array import Array
 from surgsim.models.build import Scene, SharedArm, SpecModifier, build, build_shared
 from surgsim.recording import palette
 from surgsim.recording.layout import SCENE, TIMELINE, timestamps
@@ -15,7 +16,7 @@ from surgsim.recording.shapes import Triangles, geom_triangles, joined
 from surgsim.scenario.arms import ArmsScenario, Experiment, each_arm, experiment_of
 from surgsim.scenario.schema import Scenario
 from surgsim.spatial import nearest_on_line
-from surgsim.trace.trace import Array, Trace
+from surgsim.trace.trace import Trace
 
 RCM_ARROW_SCALE = 20.0
 DESIRED_PATH, ACTUAL_PATH = "desired_path", "actual_path"
@@ -70,7 +71,7 @@ def log_scene(stream: rr.RecordingStream, scenario: Experiment, trace: Trace) ->
     log_poses(stream, scenes, bodies, trace, rows)
     for scene, one in zip(scenes, trace.each(), strict=True):
         log_paths(stream, one.block("tip_ref"), one.block("tip"), scene.prefix)
-        log_points(stream, one, rows, scene.prefix)
+        log_points(stream, one, rows, scene)
 
 
 def log_shapes(stream: rr.RecordingStream, scene: Scene) -> dict[int, str]:
@@ -230,12 +231,13 @@ def dashes(line: Array) -> list[Array]:
 
 
 def log_points(
-    stream: rr.RecordingStream, trace: Trace, rows: np.ndarray[tuple[int], np.dtype[np.intp]], of: str = ""
+    stream: rr.RecordingStream, trace: Trace, rows: np.ndarray[tuple[int], np.dtype[np.intp]], scene: Scene
 ) -> None:
-    """The tip, and the RCM error as an arrow from the trocar to the shaft; `of` as in `log_paths`."""
+    """The tip, and the RCM error as an arrow from the trocar to the shaft, of the arm in `scene`."""
     times = [rr.TimeColumn(TIMELINE, duration=timestamps(trace["t_s"][rows]))]
     tip, trocar = trace.block("tip")[rows], trace.block("trocar")[rows]
-    point, arrow = f"{SCENE}/{of}tip", f"{SCENE}/{of}rcm_error_x{RCM_ARROW_SCALE:g}"
+    point = f"{SCENE}/{scene.prefix}tip"
+    arrow = f"{SCENE}/{scene.prefix}rcm_error_x{RCM_ARROW_SCALE:g}"
     stream.log(
         point,
         rr.Points3D.from_fields(colors=[palette.VERMILION], radii=rr.Radius.ui_points(2.5)),
@@ -251,17 +253,18 @@ def log_points(
         show_labels=False,  # it would cover the port
     )
     stream.log(arrow, style, static=True)
-    vectors = RCM_ARROW_SCALE * rcm_errors(tip, trace.block("wrist")[rows], trocar)
+    vectors = RCM_ARROW_SCALE * rcm_errors(tip, trace.block("wrist")[rows], trocar, angled=scene.is_angled)
     columns = rr.Arrows3D.columns(origins=trocar.astype(np.float32), vectors=vectors.astype(np.float32))
     stream.send_columns(arrow, times, columns)
 
 
-def rcm_errors(tip: Array, wrist: Array, trocar: Array) -> Array:
+def rcm_errors(tip: Array, wrist: Array, trocar: Array, *, angled: bool) -> Array:
     """Vectors (n, 3) [m] from the trocar to the nearest point of the shaft's axis.
 
     Args:
-        tip: One point of the axis (n, 3) [m].
-        wrist: Another (n, 3) [m].
+        tip: One point of the axis (n, 3) [m], unless it is angled.
+        wrist: Another (n, 3) [m]; that nearest to the trocar where the tip is angled.
         trocar: Remote centre of motion (n, 3) [m].
+        angled: Whether the tip is off the axis.
     """
-    return nearest_on_line(trocar, wrist, tip) - trocar
+    return (wrist if angled else nearest_on_line(trocar, wrist, tip)) - trocar

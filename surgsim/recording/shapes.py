@@ -7,7 +7,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from surgsim.trace.trace import Array
+from surgsim.array import Array
 
 _AROUND = 40
 _INFINITE_PLANE_M = 5.0

@@ -9,13 +9,14 @@ from itertools import cycle, islice
 import numpy as np
 import rerun as rr
 
+from surgsim.array import Array
 from surgsim.columns import Block
 from surgsim.recording import palette
 from surgsim.recording.below import Below
 from surgsim.recording.layout import ERRORS, KEY, LIMITS, TIMELINE, Durations, series_path, timestamps
 from surgsim.recording.plots import groups
 from surgsim.recording.polyline import drawn_rows
-from surgsim.trace.trace import Array, Trace
+from surgsim.trace.trace import Trace
 
 _SCALAR_COLORS = {
     "manipulability_6d": [palette.ORANGE],

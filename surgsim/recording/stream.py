@@ -72,5 +72,7 @@ def _send_blueprint(stream: rr.RecordingStream, blueprint: rrb.Blueprint) -> Non
     )
     layout.set_time("blueprint", sequence=0)
     blueprint._log_to_stream(layout)
-    bindings.send_blueprint(layout.memory_recording().storage, False, True, recording=stream.to_native())
+    # Active, not only the default: a browser shows the recording before it has the layout, in one of its own.
+    active, default = True, True
+    bindings.send_blueprint(layout.memory_recording().storage, active, default, recording=stream.to_native())
     layout.disconnect()

@@ -7,7 +7,7 @@ import pyarrow as pa
 import rerun as rr
 
 from surgsim.errors import Outcome
-from surgsim.recording.below import Below
+from surgsim.recording.below import by_arm
 from surgsim.recording.blueprint import blueprint
 from surgsim.recording.encoding import encode
 from surgsim.recording.layout import COLUMNS, HEADER, LOG, SEAL, SUMMARY, TIMELINE, Header, seal
@@ -39,8 +39,8 @@ def write_recording(path: Path, trace: Trace, metrics: Mapping[str, float | None
     with stream_to(path, blueprint(scenario, trace), recording_id=sha256[:32]) as stream:
         stream.send_recording_name(recording_name(scenario))
         log_header(stream, texts, packed, sha256)
-        for arm, one in zip(trace.arms or ("",), trace.each(), strict=True):
-            log_signals(Below(stream, arm) if arm else stream, one)
+        for where, one in by_arm(stream, trace):
+            log_signals(where, one)
         log_scene(stream, scenario, trace)
         log_texts(stream, trace.meta, metrics)
 

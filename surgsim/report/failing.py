@@ -4,14 +4,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from surgsim.compare.failures import WORST_RCM_MM, outcome_words
 from surgsim.compare.observations import COMPLETED, Observations
 from surgsim.report.axes import Axis
 from surgsim.report.results import parameters_of
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -8,14 +8,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from surgsim.array import Array
 from surgsim.compare.observations import COMPLETED
 from surgsim.errors import SurgsimError
 from surgsim.recording.read import read_recording
 from surgsim.trace.trace import Trace
-
-Array = NDArray[np.float64]
 
 SLICES = 160
 MOST_RUNS = 8

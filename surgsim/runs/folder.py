@@ -76,14 +76,18 @@ def run_to_folder(
     return result
 
 
-def check_recordable(record: bool) -> None:
+def check_recordable(record: bool, otherwise: str = "record=False") -> None:
     """Refuse to record where recordings cannot be written.
+
+    Args:
+        record: Whether it is to be recorded.
+        otherwise: How the caller does without.
 
     Raises:
         MissingPackageError: With the package that is missing.
     """
     if record:
-        require("recordings need", *RECORDING, otherwise="--no-record")
+        require("recordings need", *RECORDING, otherwise=otherwise)
 
 
 def execute(scenario: Experiment, progress: Progress | None = None) -> RunResult:

@@ -22,6 +22,7 @@ from surgsim.models.arm import ArmModel
 from surgsim.models.config import InstrumentConfig, RobotConfig
 from surgsim.models.folders import brought_robot
 from surgsim.models.instrument_files import brought_instrument
+from surgsim.packages import MissingPackageError
 from surgsim.plugins import Offer, all_offers, offers
 from surgsim.runs.sources import hash_of, package_sha256
 from surgsim.scenario.arms import Experiment, each_arm
@@ -104,6 +105,16 @@ def check_parts(scenarios: Iterable[Experiment]) -> None:
     for part in parts:
         part.check_installed()
     check_named(part.name for part in parts if isinstance(part, ExternalConfig | ExternalLawConfig))
+
+
+def missing_package(controller: BaseModel) -> str:
+    """The line about a package that a controller needs and that is not installed; empty where all are."""
+    try:
+        for part in _parts(controller):
+            part.check_installed()
+    except MissingPackageError as error:
+        return str(error)
+    return ""
 
 
 def _parts(value: Any) -> Iterator[PartConfig]:

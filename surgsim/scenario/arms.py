@@ -10,7 +10,15 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 
 import numpy as np
-from pydantic import Field, NonNegativeInt, ValidationError, field_validator, model_validator
+from pydantic import (
+    Field,
+    NonNegativeInt,
+    SerializerFunctionWrapHandler,
+    ValidationError,
+    field_validator,
+    model_serializer,
+    model_validator,
+)
 from pydantic_core import PydanticCustomError
 
 from surgsim.catalog import Name, PartConfig
@@ -24,11 +32,13 @@ from surgsim.models.theatre import patient_place
 from surgsim.plant.disturbances import DISTURBANCES
 from surgsim.plant.disturbances.base import DisturbanceConfig
 from surgsim.scenario.schema import (
+    AnyPlant,
     RecordingConfig,
     SafetyConfig,
     Scenario,
     SimulationConfig,
     StartConfig,
+    default_plant,
     files_named,
 )
 from surgsim.scenario.thresholds import ThresholdsConfig
@@ -47,8 +57,7 @@ _SEEDS = 3
 _EACH = "give it to each of the arms, as arms.0."
 NOT_BESIDE_ARMS = {
     **{key: f"{_EACH}{key}" for key in ("robot", "instrument", "trocar", "start", "task", "controller")},
-    "plant": "several arms share the 'dynamic' plant, without its energy ledger",
-    "props": "what an arm grasps or touches is for one arm alone",
+    "props": "what an arm grasps or touches is for one arm alone; leave it out, or run one arm",
 }
 """Keys of a scenario of one arm that one of several does not have, and why."""
 
@@ -84,6 +93,7 @@ class ArmsScenario(PartConfig):
 
     Attributes:
         arms: The arms.
+        plant: Of all arms, which share one model.
         disturbances: That act on every arm, on each with draws of its own.
         patient: Where the patient lies; null: under the first port, as with one arm.
     """
@@ -95,6 +105,7 @@ class ArmsScenario(PartConfig):
     arms: Annotated[tuple[ArmConfig, ...], Field(min_length=2, max_length=MOST_ARMS)]
     patient: PatientConfig | None = None
     theatre: bool = True
+    plant: AnyPlant = default_plant()
     disturbances: tuple[AnyDisturbance, ...] = ()
     simulation: SimulationConfig = SimulationConfig()
     safety: SafetyConfig = SafetyConfig()
@@ -113,6 +124,12 @@ class ArmsScenario(PartConfig):
                     )
                     raise PydanticCustomError("placed", "{text}", {"text": text, "at": (k, "name")})
         return arms
+
+    @model_serializer(mode="wrap")
+    def _without_the_usual_plant(self, write: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """The usual plant is left out: scenarios with another one came later, and hashes stay."""
+        every: dict[str, Any] = write(self)
+        return {key: v for key, v in every.items() if key != "plant" or self.plant != default_plant()}
 
     @model_validator(mode="after")
     def _every_arm_is_a_scenario(self) -> Self:
@@ -165,6 +182,7 @@ class ArmsScenario(PartConfig):
             start=arm.start,
             task=arm.task,
             controller=arm.controller,
+            plant=self.plant,
             disturbances=(*self.disturbances, *arm.disturbances),
             simulation=self.simulation,
             safety=arm.safety or self.safety,

@@ -74,7 +74,10 @@ def load_scenario(
     """
     document = _given(source, controller, assignments, seed)
     if "arms" in document.tree:
-        raise ScenarioError(document.where(("arms",)), "a scenario of one arm is needed here")
+        raise ScenarioError(
+            document.where(("arms",)),
+            "a scenario of one arm is needed here; several are run by surgsim.run and surgsim.compare",
+        )
     return validate(Scenario, document)
 
 

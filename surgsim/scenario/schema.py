@@ -50,7 +50,8 @@ else:
     AnyDisturbance, AnyProp = DISTURBANCES.union(), PROPS.union()
 
 
-def _default_plant() -> AnyPlant:
+def default_plant() -> AnyPlant:
+    """The plant of a scenario that names none."""
     config: Any = PLANTS.config(DEFAULT)
     plant: AnyPlant = config()
     return plant
@@ -166,7 +167,7 @@ class Scenario(PartConfig):
     start: StartConfig = StartConfig()
     task: AnyTask
     controller: ControllerConfig
-    plant: AnyPlant = _default_plant()
+    plant: AnyPlant = default_plant()
     disturbances: tuple[AnyDisturbance, ...] = ()
     props: tuple[AnyProp, ...] = ()
     simulation: SimulationConfig = SimulationConfig()

@@ -3,9 +3,7 @@
 import math
 from collections.abc import Callable
 
-import numpy as np
-from numpy.typing import NDArray
-
+from surgsim.array import Array
 from surgsim.columns import joints, width
 from surgsim.errors import Outcome, SurgsimError
 from surgsim.plant.bore import Bore
@@ -24,7 +22,6 @@ from surgsim.tick.arrays import Control, Record, World, new, point
 from surgsim.tick.status import TORQUE_RATE
 from surgsim.trace.trace import Ending, Trace, TraceMeta, base_blocks
 
-Array = NDArray[np.float64]
 Progress = Callable[[float, float], None]
 """Called now and then with the simulated time reached and the whole duration [s]."""
 

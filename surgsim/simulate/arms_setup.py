@@ -10,7 +10,9 @@ from surgsim.errors import SurgsimError, UnreachableError
 from surgsim.models.arm import ArmModel
 from surgsim.models.build import SharedArm, build_shared
 from surgsim.plant.between import ArmsWatch
-from surgsim.plant.dynamic import DynamicPlant
+from surgsim.plant.dynamic import DynamicPlant, DynamicPlantConfig
+from surgsim.plant.kinematic import KinematicPlant
+from surgsim.plant.several import SharedPlant
 from surgsim.scenario.arms import ArmsScenario
 from surgsim.simulate.setup import Setup, beginning, check_times, controller_of
 
@@ -29,7 +31,7 @@ class ArmsSetup:
 
     scenario: ArmsScenario
     arms: Mapping[str, Setup]
-    plants: tuple[DynamicPlant, ...]
+    plants: tuple[SharedPlant, ...]
     data: mujoco.MjData
     watch: ArmsWatch
 
@@ -77,10 +79,15 @@ def prepare_arms(scenario: ArmsScenario) -> ArmsSetup:
     mujoco.mj_kinematics(model, data)
     if touching := watch.look():
         raise UnreachableError(f"{scenario.name}: the arms touch at the start: {touching}")
-    arms, plants = dict[str, Setup](), []
+    arms, plants = dict[str, Setup](), list[SharedPlant]()
     for name, one in each.items():
         with naming_arm(scenario.name, name):
-            plant = DynamicPlant(scenes[name], period, parts[name], one.run_seed(), data=data)
+            plant: SharedPlant
+            if isinstance(one.plant, DynamicPlantConfig):
+                seed, books = one.run_seed(), one.plant.energy_ledger
+                plant = DynamicPlant(scenes[name], period, parts[name], seed, energy_ledger=books, data=data)
+            else:
+                plant = KinematicPlant(scenes[name], period, data=data)
             arms[name] = Setup(
                 scenario=one,
                 scene=scenes[name],

@@ -8,13 +8,13 @@ import numpy as np
 from numba import types
 from numpy.typing import NDArray
 
+from surgsim.array import Array
 from surgsim.compiled import compiled
 from surgsim.control.manipulability import manipulabilities
 from surgsim.tick.algebra import cross, norm
 from surgsim.tick.arrays import A2, I1, Model, type_of
 from surgsim.tick.scratch import scratch
 
-Array = NDArray[np.float64]
 Ids = NDArray[np.int64]
 
 Q, TIP, TIP_REF, WRIST, TROCAR, TIP_ERROR, RCM_ERROR, MU, MU_6D = range(9)

@@ -10,8 +10,8 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from surgsim.array import Array
 from surgsim.compiled import compiled
 from surgsim.control.manifold import Manifold, fill_constraints
 from surgsim.plant.contacts import NOTHING, Watch, forbidden_contact
@@ -19,8 +19,6 @@ from surgsim.tick.algebra import back_substitute, dot, factor, nearest, norm
 from surgsim.tick.arrays import Model
 from surgsim.tick.nominal import kinematics
 from surgsim.tick.scratch import scratch, scratch_matrix
-
-Array = NDArray[np.float64]
 
 REACHED_M = 1e-4
 """What tip and shaft may lack at a place of a path, as one norm [m]."""

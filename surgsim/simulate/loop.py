@@ -115,7 +115,7 @@ class Simulation:
     @property
     def due(self) -> bool:
         """Whether the next tick ends the run whatever the controller does: time is up, or a limit passed."""
-        return self._only.over or not self._only.safe
+        return self._way.due
 
     def run(self, progress: Progress | None = None) -> Trace:
         """Tick to the end; if that is an outcome that stops the arm, stop it and hold it for a while."""

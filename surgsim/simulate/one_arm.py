@@ -2,10 +2,11 @@
 
 import mujoco
 
+from surgsim.array import Array
 from surgsim.compiled import as_parameter
 from surgsim.errors import Outcome
 from surgsim.scenario.schema import Scenario
-from surgsim.simulate.arm_run import ArmRun, Array, stop_ticks_of, ticks_of
+from surgsim.simulate.arm_run import ArmRun, stop_ticks_of, ticks_of
 from surgsim.simulate.setup import Setup
 from surgsim.simulate.ticks import (
     GOING,
@@ -48,6 +49,11 @@ class OneArm:
     def data(self) -> mujoco.MjData:
         """MuJoCo's data."""
         return self._setup.plant.data
+
+    @property
+    def due(self) -> bool:
+        """Whether the next tick ends the run whatever the controller does."""
+        return self._arm.over or not self._arm.safe
 
     def begin(self) -> None:
         """Put everything at its start, and ask the task for its first command."""

@@ -11,13 +11,11 @@ picks one of the redundant solutions.
 
 import daqp
 import numpy as np
-from numpy.typing import NDArray
 
+from surgsim.array import Array
 from surgsim.control.rcm import rcm_kinematics
 from surgsim.simulate.reach import LIMIT_MARGIN_RAD, Reach
 from surgsim.simulate.screw import tip_error
-
-Array = NDArray[np.float64]
 
 _TIP_M, _RCM_M = 1e-6, 1e-6
 _TURNS_RAD = (0.0, 0.5, -0.5, 1.0, -1.0, 1.5, -1.5)

@@ -3,8 +3,8 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from surgsim.array import Array
 from surgsim.control.manifold import Manifold
 from surgsim.control.rcm import rcm_kinematics
 from surgsim.models.arm import RCM_ROWS, ArmModel
@@ -14,8 +14,6 @@ from surgsim.plant.contacts import ContactWatch
 from surgsim.simulate.following import Path, follow, improve_start, settle, whole_turns
 from surgsim.spatial import unit
 from surgsim.tick.arrays import Model, new
-
-Array = NDArray[np.float64]
 
 LIMIT_MARGIN_RAD = 0.01
 """Distance that a start and its path keep from the joint limits."""

@@ -3,6 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from surgsim.array import Array
 from surgsim.columns import Block, width
 from surgsim.compiled import as_parameter
 from surgsim.models.arm import ArmModel
@@ -10,7 +11,6 @@ from surgsim.simulate.derived import DERIVED_BLOCKS, derive, derive_signature
 from surgsim.tick.arrays import Model, new
 from surgsim.trace.trace import Trace, TraceMeta
 
-Array = NDArray[np.float64]
 Group = tuple[Block, ...]
 
 

@@ -4,8 +4,8 @@ import math
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from surgsim.array import Array
 from surgsim.compiled import compiled
 from surgsim.errors import Outcome
 from surgsim.models.build import JointLimits
@@ -18,7 +18,6 @@ from surgsim.tick.algebra import norm
 from surgsim.tick.arrays import Command, Record, World, new
 from surgsim.trace.trace import Ending
 
-Array = NDArray[np.float64]
 _POSITION_SLACK_RAD = 1e-9
 _VELOCITY_SLACK = 1e-9
 

@@ -14,11 +14,9 @@ eqs. 174, 179 and 180.
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
+from surgsim.array import Array
 from surgsim.spatial import skew
-
-Array = NDArray[np.float64]
 
 
 def tip_error(p_t: Array, p_WT: Array, R_WT: Array, Jv_WT: Array, Jw_WT: Array) -> tuple[Array, Array]:

@@ -6,11 +6,9 @@ the first place and cover them. The best are improved by self-motion, on some pl
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
+from surgsim.array import Array
 from surgsim.simulate.reach import Reach, Start
-
-Array = NDArray[np.float64]
 
 _SEED = 20_261_129
 _STARTS = 256

@@ -6,8 +6,8 @@ from typing import TypeGuard
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
+from surgsim.array import Array
 from surgsim.control.controller import Controller
 from surgsim.errors import SurgsimError, UnreachableError
 from surgsim.models.arm import ArmModel
@@ -19,7 +19,6 @@ from surgsim.simulate.reach import Reach
 from surgsim.simulate.start import Places, check_path, check_through_port, solve_start
 from surgsim.tasks.base import EnteringTaskConfig, Task, TaskConfig, WeighsForce
 
-Array = NDArray[np.float64]
 MOST_TICKS = 4_000_000
 MOST_STEPS = 200_000_000
 
@@ -130,7 +129,8 @@ def _build_task(scenario: Scenario, start: Array) -> Task:
     """The task, its path beginning at `start` (3,) [m].
 
     Raises:
-        SurgsimError: If it enters a port and there is none, or starts beside it, or with an angled tip.
+        SurgsimError: If it enters a port and there is none, or starts beside it, or the bent part of the
+            instrument is too wide for the bore.
     """
     config, period = scenario.task, scenario.simulation.control_period_s
     if not _enters(config):
@@ -140,15 +140,26 @@ def _build_task(scenario: Scenario, start: Array) -> Task:
         return task
     if scenario.trocar is None:
         raise SurgsimError(f"{scenario.name}: task '{config.type}' needs a trocar")
-    if scenario.instrument is not None and scenario.instrument.tip_from_shaft_m[0] > 0.0:
-        raise SurgsimError(
-            f"{scenario.name}: task '{config.type}' takes the tip along the port's axis, where the shaft is: "
-            "the instrument's tip is off the shaft's line"
-        )
+    _check_bore(scenario, scenario.trocar)
+    p_ST = None if scenario.instrument is None else scenario.instrument.p_ST
     try:
-        return config.build(start, period, scenario.task_seed(), trocar=scenario.trocar)
+        return config.build(start, period, scenario.task_seed(), trocar=scenario.trocar, p_ST=p_ST)
     except ValueError as error:
         raise SurgsimError(f"{scenario.name}: task: {error}") from error
+
+
+def _check_bore(scenario: Scenario, trocar: TrocarConfig) -> None:
+    """Refuse a bent part that does not go through the bore of a physical wall, the shaft along its axis."""
+    instrument = scenario.instrument
+    if instrument is None or trocar.wall is None or not instrument.p_ST.any():
+        return
+    width = instrument.tip_from_shaft_m[0] + instrument.shaft_diameter_m
+    if width > trocar.bore_diameter_m:
+        raise SurgsimError(
+            f"{scenario.name}: the instrument's bent part is {1e3 * width:.1f} mm wide with the shaft, and "
+            f"the bore {1e3 * trocar.bore_diameter_m:.1f} mm: it cannot be inserted. Give a "
+            f"trocar.bore_diameter_m of {width:.4f}, or trocar.wall: null"
+        )
 
 
 def _enters(config: TaskConfig) -> TypeGuard[EnteringTaskConfig]:
@@ -187,10 +198,19 @@ def _check_beginnings(scenario: Scenario, task: Task) -> None:
 
 
 def _path_start(scenario: Scenario, arm: ArmModel) -> Array:
-    """Where the path begins (3,) [m]."""
+    """Where the path begins (3,) [m]: that of the tip, or through a port that of the shaft's end."""
     if scenario.task.start_m is not None:
         return np.array(scenario.task.start_m)
-    return arm.kinematics(np.array(scenario.start.q_rad)).p_WT
+    kin = arm.kinematics(np.array(scenario.start.q_rad))
+    return kin.p_WS if _enters(scenario.task) else kin.p_WT
+
+
+def _led_arm(scenario: Scenario) -> ArmModel:
+    """The nominal arm, its tip at what the task leads: at the shaft's end where it goes through the port."""
+    scene = scenario.scene
+    if scene.instrument is not None and _enters(scenario.task):
+        scene = scene.model_copy(update={"instrument": scene.instrument.up_to_shaft_end()})
+    return ArmModel(scene)
 
 
 def _start_key(scenario: Scenario) -> str:
@@ -206,7 +226,7 @@ def _start_key(scenario: Scenario) -> str:
 def _start_of(scenario_json: str) -> Array:
     """Start configuration (n,) [rad], with the path checked; found once for the runs of a batch."""
     scenario = Scenario.model_validate_json(scenario_json)
-    arm = ArmModel(scenario.scene)
+    arm = _led_arm(scenario)
     trocar, given = scenario.trocar, scenario.start.q_rad
     p_start = _path_start(scenario, arm)
     try:
@@ -230,8 +250,11 @@ def _start_of(scenario_json: str) -> Array:
 
 def _check_port(scenario: Scenario, trocar: TrocarConfig, places: Places) -> None:
     """Refuse places that are no pose of the instrument through the port."""
+    entering, instrument = _enters(scenario.task), scenario.instrument
+    if entering and instrument is not None:
+        instrument = instrument.up_to_shaft_end()
     for where, p in places:
-        check_through_port(p, where, scenario.instrument, trocar, _enters(scenario.task))
+        check_through_port(p, where, instrument, trocar, entering)
 
 
 def _solved_start(scenario: Scenario, arm: ArmModel, places: Array) -> Array:

@@ -7,13 +7,14 @@ from typing import Any, TypeVar
 import mujoco
 import numpy as np
 
+from surgsim.array import Array
 from surgsim.columns import of_arm
 from surgsim.compiled import address_of, as_parameter
 from surgsim.errors import Outcome
 from surgsim.plant.between import Between
 from surgsim.plant.several import SeveralPlants, Shared
 from surgsim.scenario.arms import ArmsScenario
-from surgsim.simulate.arm_run import ArmRun, Array, stop_ticks_of, ticks_of
+from surgsim.simulate.arm_run import ArmRun, stop_ticks_of, ticks_of
 from surgsim.simulate.arms_setup import ArmsSetup
 from surgsim.simulate.arms_ticks import (
     ENTRY,
@@ -47,7 +48,8 @@ class SeveralArms:
     def __init__(self, setup: ArmsSetup) -> None:
         self._setup = setup
         each = setup.arms
-        self.stop_ticks = max(stop_ticks_of(arm) for arm in each.values())
+        held = [stop_ticks_of(arm) for arm in each.values() if arm.scenario.plant.uses_torque]
+        self.stop_ticks = max(held, default=0)
         most = max(ticks_of(arm) for arm in each.values()) + 1 + self.stop_ticks
         self._by_name = {name: ArmRun(arm, most) for name, arm in each.items()}
         self.arms = tuple(self._by_name.values())
@@ -69,6 +71,12 @@ class SeveralArms:
     def data(self) -> mujoco.MjData:
         """MuJoCo's data."""
         return self._setup.data
+
+    @property
+    def due(self) -> bool:
+        """Whether the next tick ends the run whatever the controllers do: a limit of any, or all are done."""
+        safe = all(arm.safe for arm in self.arms) and self._watch.look() is None
+        return not safe or all(arm.over for arm in self.arms)
 
     def begin(self) -> None:
         """Put everything at its start, and ask the tasks for their first commands."""

@@ -12,11 +12,11 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from surgsim.array import Array
 from surgsim.simulate.objects import Stored
 from surgsim.tick.arrays import Record
 from surgsim.trace.trace import Ending
 
-Array = NDArray[np.float64]
 Bytes = NDArray[np.uint8]
 
 

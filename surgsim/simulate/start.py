@@ -5,8 +5,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from surgsim.array import Array
 from surgsim.errors import UnreachableError
 from surgsim.models.arm import ArmModel
 from surgsim.models.config import InstrumentConfig, SceneConfig, TrocarConfig
@@ -14,7 +14,6 @@ from surgsim.simulate.reach import LIMIT_MARGIN_RAD, Reach, Start
 from surgsim.simulate.search import roomiest
 from surgsim.spatial import unit
 
-Array = NDArray[np.float64]
 Places = Sequence[tuple[str, Array]]
 
 MAX_INCLINATION_RAD = np.deg2rad(80.0)

@@ -8,11 +8,12 @@ falls, and its instrument is in a patient.
 import math
 from typing import ClassVar
 
+from surgsim.array import Array
 from surgsim.compiled import compiled
 from surgsim.models.arm import ArmModel
 from surgsim.scenario.schema import StopConfig
 from surgsim.tick.algebra import times
-from surgsim.tick.arrays import Array, Model, Record, World, new
+from surgsim.tick.arrays import Model, Record, World, new
 from surgsim.tick.nominal import dynamics, kinematics
 from surgsim.tick.scratch import scratch
 

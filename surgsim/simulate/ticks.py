@@ -8,10 +8,9 @@ import math
 from functools import cache
 from typing import Any, ClassVar
 
-import numpy as np
 from numba import types
-from numpy.typing import NDArray
 
+from surgsim.array import Array
 from surgsim.compiled import call_at, compiled
 from surgsim.control.decision import ESTIMATOR, INSTRUMENT, decide, forget, measure
 from surgsim.plant.bore import Bore
@@ -33,8 +32,6 @@ from surgsim.tick.clock import thread_time
 from surgsim.tick.nominal import kinematics
 from surgsim.tick.status import GOES_ON, INFEASIBLE, RANK_LOST, TOLD
 from surgsim.tick.views import numbers, vector
-
-Array = NDArray[np.float64]
 
 GOING, UNSAFE, FAILED, NOT_FINITE, DONE, TASK_TOLD, PLANT_TOLD, ARMS_TOUCH = range(8)
 """Why `run_ticks` came back: nothing ended, or what did; the last one is of several arms alone."""

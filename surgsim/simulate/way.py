@@ -4,8 +4,9 @@ from typing import Protocol
 
 import mujoco
 
+from surgsim.array import Array
 from surgsim.scenario.arms import Experiment
-from surgsim.simulate.arm_run import ArmRun, Array
+from surgsim.simulate.arm_run import ArmRun
 from surgsim.tick.arrays import Record
 from surgsim.trace.trace import Ending, Trace
 
@@ -32,6 +33,11 @@ class Way(Protocol):
     @property
     def data(self) -> mujoco.MjData:
         """MuJoCo's data."""
+        ...
+
+    @property
+    def due(self) -> bool:
+        """Whether the next tick ends the run whatever the controllers do: time is up, or a limit passed."""
         ...
 
     def begin(self) -> None:

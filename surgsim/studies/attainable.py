@@ -4,7 +4,8 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from surgsim.studies.study import Array, Curves
+from surgsim.array import Array
+from surgsim.studies.study import Curves
 from surgsim.tasks.profile import Profile
 
 

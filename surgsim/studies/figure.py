@@ -6,8 +6,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from surgsim.array import Array
 from surgsim.recording import palette
 
 VERMILLION, BLUE, GREEN, PURPLE, ORANGE, BLACK = map(
@@ -85,14 +85,12 @@ def label(
         legend_below(axes, legend)
 
 
-def formula(ax: Axes, x: NDArray[np.float64], y: NDArray[np.float64], label: str) -> None:
+def formula(ax: Axes, x: Array, y: Array, label: str) -> None:
     """A dashed curve of a formula, on a logarithmic axis."""
     ax.semilogy(x, y, "--", color=BLACK, linewidth=1.4, label=label)
 
 
-def heat_map(
-    ax: Axes, values: NDArray[np.float64], xs: Sequence[float], ys: Sequence[float], bound: float
-) -> None:
+def heat_map(ax: Axes, values: Array, xs: Sequence[float], ys: Sequence[float], bound: float) -> None:
     """Positive values (ys, xs) as colours and numbers; those up to the bound are boxed."""
     ax.grid(visible=False)
     ax.imshow(np.log(values / bound), cmap="cividis", aspect="auto", origin="lower", vmin=-3.0, vmax=2.0)

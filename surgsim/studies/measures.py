@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from surgsim.array import Array
 from surgsim.metrics.accuracy import rms
-from surgsim.studies.study import Array
 from surgsim.studies.tables import Row
 from surgsim.trace.trace import Trace
 

@@ -6,12 +6,13 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
+from surgsim.array import Array
 from surgsim.control.rcm import rcm_kinematics
 from surgsim.simulate.loop import Simulation
 from surgsim.simulate.setup import Setup, prepare
 from surgsim.studies.figure import Axes, formula, label
 from surgsim.studies.measures import decay_rate, outcome, within_from_s
-from surgsim.studies.study import Array, Results, SimulatedCase
+from surgsim.studies.study import Results, SimulatedCase
 from surgsim.studies.tables import Row, Tables, groups, numbers, pick
 from surgsim.trace.trace import Trace
 

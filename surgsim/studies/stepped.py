@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from surgsim.studies.study import Array
+from surgsim.array import Array
 from surgsim.tasks.base import Feedback, Task, TimedTask, TipCommand
 from surgsim.trace.trace import Trace
 

@@ -5,15 +5,12 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from typing import Any, ClassVar, Literal, cast
 
-import numpy as np
-from numpy.typing import NDArray
-
+from surgsim.array import Array
 from surgsim.scenario.schema import Scenario
 from surgsim.simulate.loop import simulate
 from surgsim.studies.tables import Row, Tables
 from surgsim.trace.trace import Trace
 
-Array = NDArray[np.float64]
 Curves = Mapping[str, Array]
 Progress = Callable[[str], None]
 """Called with a line about what is being done."""

@@ -7,9 +7,9 @@ from typing import Annotated, Any, ClassVar, Protocol, Self, runtime_checkable
 
 import numpy as np
 from numba.extending import is_jitted
-from numpy.typing import NDArray
 from pydantic import Field, NonNegativeFloat, PositiveFloat, model_validator
 
+from surgsim.array import Array
 from surgsim.catalog import PartConfig, Surroundings
 from surgsim.columns import Block
 from surgsim.compiled import compiled
@@ -23,7 +23,6 @@ from surgsim.tick.blank import new_command, new_feedback
 from surgsim.tick.scratch import scratch_matrix
 from surgsim.tick.status import GOES_ON
 
-Array = NDArray[np.float64]
 _REACH_SAMPLES = 200
 
 
@@ -174,8 +173,16 @@ class EnteringTaskConfig(TaskConfig, Protocol):
         period_s: float,
         seed: np.random.SeedSequence,
         trocar: TrocarConfig | None = None,
+        p_ST: Array | None = None,
     ) -> Task:
-        """The task through `trocar`.
+        """The task through `trocar`; what begins at `start` and goes through it is the shaft's end.
+
+        Args:
+            start: Where it begins (3,) [m].
+            period_s: Between two commands [s].
+            seed: Of everything random in it.
+            trocar: The port.
+            p_ST: The tip from the shaft's end in the instrument's frame (3,) [m]; None: it is there.
 
         Raises:
             ValueError: If `start` is not in front of the port.

@@ -4,15 +4,13 @@ from typing import Any
 
 import numpy as np
 from numba.core.dispatcher import Dispatcher
-from numpy.typing import NDArray
 
+from surgsim.array import Array
 from surgsim.compiled import address_of
 from surgsim.tasks.base import Feedback, Task
 from surgsim.tasks.command import fill_command
 from surgsim.tick.arrays import Command, task_signature
 from surgsim.tick.python_part import PythonPart, python_kernel
-
-Array = NDArray[np.float64]
 
 
 class BoundTask:

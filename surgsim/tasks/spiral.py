@@ -5,8 +5,9 @@ from typing import Any, ClassVar, Literal
 
 from pydantic import PositiveFloat
 
+from surgsim.array import Array
 from surgsim.compiled import compiled
-from surgsim.tasks.base import Array, PathTaskConfig, Turns, following
+from surgsim.tasks.base import PathTaskConfig, Turns, following
 
 
 @compiled

@@ -7,10 +7,7 @@ the tip left its path because a joint was at its limit.
 from dataclasses import dataclass
 from typing import Protocol
 
-import numpy as np
-from numpy.typing import NDArray
-
-Array = NDArray[np.float64]
+from surgsim.array import Array
 
 
 class RunColumns(Protocol):

@@ -5,9 +5,9 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Literal, Self
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import NonNegativeFloat, PositiveFloat, model_validator
 
+from surgsim.array import Array
 from surgsim.catalog import PartConfig, Surroundings
 from surgsim.columns import width
 from surgsim.compiled import as_parameter
@@ -55,7 +55,6 @@ from surgsim.tick.overlay import laid_over, take
 from surgsim.tick.python_part import PythonPart
 from surgsim.tick.status import GOES_ON
 
-Array = NDArray[np.float64]
 _MOST_PERIODS = 4_000_000
 
 if TYPE_CHECKING:

@@ -3,9 +3,9 @@
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field, NonNegativeFloat, PositiveFloat
 
+from surgsim.array import Array
 from surgsim.catalog import PartConfig
 from surgsim.models.config import Vec3
 from surgsim.models.peg_board import PegBoardLayout, transfer_goals
@@ -13,7 +13,6 @@ from surgsim.tasks.success import RunColumns, Success
 from surgsim.teleop.goals import Goal
 from surgsim.teleop.judgement import faults, stuck
 
-Array = NDArray[np.float64]
 _STEP_M = 0.005
 _ABOVE_M = 0.001
 RING_ON_TARGET = 2.0

@@ -2,6 +2,7 @@
 
 import math
 
+from surgsim.array import Array
 from surgsim.columns import scalar
 from surgsim.compiled import compiled
 from surgsim.teleop.channel import Channel, in_flight
@@ -9,7 +10,6 @@ from surgsim.teleop.messages import TANK
 from surgsim.teleop.operator_side import OperatorSide, OperatorSideLaw
 from surgsim.teleop.remote_side import RemoteSide, RemoteSideLaw
 from surgsim.teleop.tank import Tank, level
-from surgsim.tick.arrays import Array
 
 ACCOUNT_COLUMNS = (
     scalar("in_flight", "j"),

@@ -11,12 +11,13 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import Field, FiniteFloat, NonNegativeFloat, model_validator
 
+from surgsim.array import Array
 from surgsim.catalog import PartConfig
 from surgsim.compiled import compiled
 from surgsim.teleop.messages import CONTENT
 from surgsim.teleop.networks import NETWORKS, NetworkName
 from surgsim.teleop.recorded import read_delays
-from surgsim.tick.arrays import Array, Record
+from surgsim.tick.arrays import Record
 
 Probability = Annotated[float, Field(ge=0.0, lt=1.0)]
 EnergyMode = Literal["power", "cumulative"]

@@ -2,11 +2,12 @@
 
 from pydantic import PositiveFloat
 
+from surgsim.array import Array
 from surgsim.catalog import PartConfig
 from surgsim.compiled import compiled
 from surgsim.teleop.console import ConsoleState
 from surgsim.teleop.reach import Reach
-from surgsim.tick.arrays import Array, Record
+from surgsim.tick.arrays import Record
 
 
 class ClutchConfig(PartConfig):

@@ -6,11 +6,12 @@ from typing import ClassVar
 import mujoco
 from pydantic import PositiveFloat
 
+from surgsim.array import Array
 from surgsim.catalog import PartConfig
 from surgsim.compiled import compiled
 from surgsim.resources import resource_dir
 from surgsim.tick.algebra import norm, times, transposed_times
-from surgsim.tick.arrays import Array, Record, new
+from surgsim.tick.arrays import Record, new
 from surgsim.tick.mujoco_calls import mj_jacSite, mj_step1, mj_step2
 from surgsim.tick.views import vector
 

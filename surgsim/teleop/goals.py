@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from surgsim.tick.arrays import Array
+from surgsim.array import Array
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -5,8 +5,9 @@ from typing import ClassVar, Protocol
 
 import numpy as np
 
+from surgsim.array import Array
 from surgsim.teleop.console import ConsoleState
-from surgsim.tick.arrays import Array, Record
+from surgsim.tick.arrays import Record
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)

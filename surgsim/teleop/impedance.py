@@ -1,8 +1,9 @@
 """The hand on the handle: a spring and damper between where it is meant to be and where it is."""
 
+from surgsim.array import Array
 from surgsim.compiled import compiled
 from surgsim.teleop.console import ConsoleState
-from surgsim.tick.arrays import Array, Record
+from surgsim.tick.arrays import Record
 
 
 class Grip(Record):

@@ -9,9 +9,9 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from surgsim.array import Array
 from surgsim.teleop.console import JOINTS
 
-Array = NDArray[np.float64]
 PASSIVE_J = 1e-3
 """Energy delivered beyond what was stored, up to which a run is called passive [J]."""
 REST_M_PER_S = 0.02

@@ -8,9 +8,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 from pydantic import NonNegativeFloat, PositiveFloat, model_validator
 
+from surgsim.array import Array
 from surgsim.catalog import PartConfig
 from surgsim.compiled import compiled
-from surgsim.tick.arrays import Array, Record
+from surgsim.tick.arrays import Record
 
 
 class ScaleChangeConfig(PartConfig):

@@ -6,6 +6,7 @@ from typing import ClassVar, Literal
 import numpy as np
 from pydantic import NonNegativeFloat, PositiveFloat
 
+from surgsim.array import Array
 from surgsim.catalog import PartConfig
 from surgsim.compiled import compiled
 from surgsim.teleop.clutch import ClutchConfig, ClutchLaw, leaves_no_room
@@ -18,7 +19,7 @@ from surgsim.teleop.reach import Reach, ReachConfig, ReachLaw, aim, reach_at
 from surgsim.teleop.roll import turn_grip
 from surgsim.teleop.tremor import TremorConfig, resonance, shake
 from surgsim.tick.algebra import dot
-from surgsim.tick.arrays import Array, Record
+from surgsim.tick.arrays import Record
 from surgsim.tick.overlay import take
 
 

@@ -2,6 +2,7 @@
 
 from typing import ClassVar
 
+from surgsim.array import Array
 from surgsim.columns import scalar, vector
 from surgsim.compiled import compiled
 from surgsim.teleop.bilateral.base import End
@@ -27,7 +28,7 @@ from surgsim.teleop.roll import RollLaw, rate_about
 from surgsim.teleop.tank import Tank, TankLaw, affordable, exchange, level, send_surplus
 from surgsim.teleop.tremor_filter import TremorFilter, TremorFilterLaw, steady
 from surgsim.tick.algebra import dot
-from surgsim.tick.arrays import Array, Record
+from surgsim.tick.arrays import Record
 from surgsim.tick.python_part import enter
 from surgsim.tick.status import GOES_ON
 

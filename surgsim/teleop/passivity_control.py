@@ -15,10 +15,11 @@ from typing import Literal
 import numpy as np
 from pydantic import NonNegativeFloat, PositiveFloat
 
+from surgsim.array import Array
 from surgsim.catalog import PartConfig
 from surgsim.compiled import compiled
 from surgsim.tick.algebra import dot, norm
-from surgsim.tick.arrays import Array, Record
+from surgsim.tick.arrays import Record
 
 
 class PassivityControlConfig(PartConfig):

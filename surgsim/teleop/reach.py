@@ -6,10 +6,11 @@ from typing import ClassVar
 import numpy as np
 from pydantic import NonNegativeFloat, PositiveFloat
 
+from surgsim.array import Array
 from surgsim.catalog import PartConfig
 from surgsim.compiled import compiled
 from surgsim.tick.algebra import norm
-from surgsim.tick.arrays import Array, Record
+from surgsim.tick.arrays import Record
 
 _PEAK = 1.875  # peak over mean speed of a minimum-jerk movement
 

@@ -5,11 +5,12 @@ from typing import ClassVar
 
 from pydantic import NonNegativeFloat, PositiveFloat
 
+from surgsim.array import Array
 from surgsim.catalog import PartConfig
 from surgsim.compiled import compiled
 from surgsim.teleop.channel import ENERGY, MESSAGE, NUMBER, SENT, Channel, ChannelLaw, arrived
 from surgsim.teleop.messages import CONTENT
-from surgsim.tick.arrays import Array, Record
+from surgsim.tick.arrays import Record
 
 
 class ReceiverConfig(PartConfig):

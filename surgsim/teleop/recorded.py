@@ -7,9 +7,9 @@ from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from surgsim.array import Array
+
 COLUMN = "delay_s"
 MOST_DELAY_S = 60.0
 """A larger delay is taken for a mistake of the unit."""

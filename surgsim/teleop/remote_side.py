@@ -3,6 +3,7 @@
 import math
 from typing import ClassVar
 
+from surgsim.array import Array
 from surgsim.columns import scalar, vector
 from surgsim.compiled import compiled
 from surgsim.teleop.bilateral.base import End
@@ -23,7 +24,7 @@ from surgsim.teleop.receiver import Receiver, ReceiverLaw, receive, trust
 from surgsim.teleop.roll import RollLaw, rate_about, roll_rate
 from surgsim.teleop.tank import Tank, TankLaw, budget, exchange, level, send_surplus
 from surgsim.tick.algebra import dot, norm
-from surgsim.tick.arrays import Array, Record
+from surgsim.tick.arrays import Record
 from surgsim.tick.status import GOES_ON
 
 REMOTE_COLUMNS = (

@@ -4,9 +4,10 @@ import math
 
 from pydantic import NonNegativeFloat
 
+from surgsim.array import Array
 from surgsim.catalog import PartConfig
 from surgsim.compiled import compiled
-from surgsim.tick.arrays import Array, Record
+from surgsim.tick.arrays import Record
 
 
 class RollConfig(PartConfig):

@@ -11,6 +11,7 @@ import math
 from collections.abc import Sequence
 from typing import ClassVar, NamedTuple
 
+from surgsim.array import Array
 from surgsim.columns import scalar, vector, width
 from surgsim.compiled import compiled
 from surgsim.teleop.account import ACCOUNT_COLUMNS, fill_account
@@ -34,7 +35,7 @@ from surgsim.teleop.remote_side import (
     step_remote_side,
 )
 from surgsim.teleop.tip_work import TipWork, add_tip_work
-from surgsim.tick.arrays import Array, Command, Feedback, Record
+from surgsim.tick.arrays import Command, Feedback, Record
 from surgsim.tick.overlay import overlay
 from surgsim.tick.status import GOES_ON
 

@@ -2,8 +2,9 @@
 
 from typing import ClassVar
 
+from surgsim.array import Array
 from surgsim.compiled import compiled
-from surgsim.tick.arrays import Array, Record
+from surgsim.tick.arrays import Record
 
 
 class TipWork(Record):

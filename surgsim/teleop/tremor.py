@@ -3,14 +3,11 @@
 import math
 from typing import Annotated
 
-import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field, NonNegativeFloat, PositiveFloat
 
+from surgsim.array import Array
 from surgsim.catalog import PartConfig
 from surgsim.compiled import compiled
-
-Array = NDArray[np.float64]
 
 
 class TremorConfig(PartConfig):

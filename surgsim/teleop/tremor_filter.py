@@ -6,9 +6,10 @@ from typing import ClassVar, Literal, Self
 import numpy as np
 from pydantic import Field, PositiveFloat, model_validator
 
+from surgsim.array import Array
 from surgsim.catalog import PartConfig
 from surgsim.compiled import compiled
-from surgsim.tick.arrays import Array, Record
+from surgsim.tick.arrays import Record
 
 MOST_FREQUENCIES = 32
 NONE, LOW_PASS, BMFLC = range(3)

@@ -6,12 +6,11 @@ Loops in a fixed order: the compiled and the Python form give the same bits, whi
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from surgsim.array import Array
 from surgsim.compiled import compiled
 from surgsim.tick.scratch import scratch, scratch_matrix
 
-Array = NDArray[np.float64]
 DEPENDENT = 1e-14
 """A pivot below this share of its diagonal entry counts as lost rank."""
 _SWEEPS = 20  # Jacobi's method needs about six

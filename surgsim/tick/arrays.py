@@ -17,9 +17,9 @@ import numpy as np
 from numba import from_dtype, types
 from numpy.typing import NDArray
 
+from surgsim.array import Array
 from surgsim.errors import SurgsimError
 
-Array = NDArray[np.float64]
 Ids = NDArray[np.int64]
 
 A1 = types.float64[::1]

@@ -1,8 +1,9 @@
 """The nominal model of the arm, evaluated from compiled code."""
 
+from surgsim.array import Array
 from surgsim.compiled import compiled
 from surgsim.tick.algebra import cross, dot
-from surgsim.tick.arrays import Array, Model, Seen
+from surgsim.tick.arrays import Model, Seen
 from surgsim.tick.mujoco_calls import (
     mj_comPos,
     mj_comVel,

@@ -13,11 +13,10 @@ from functools import cache
 from typing import Any, TypeVar, cast
 
 import numpy as np
-from numpy.typing import NDArray
 
+from surgsim.array import Array
 from surgsim.tick.arrays import Record, layout
 
-Array = NDArray[np.float64]
 R = TypeVar("R", bound=Record)
 
 

@@ -15,8 +15,8 @@ from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic, overload
 
+from surgsim.array import Array
 from surgsim.compiled import compiled
-from surgsim.tick.arrays import Array
 from surgsim.tick.status import GOES_ON, TOLD
 
 _CALL = ctypes.CFUNCTYPE(ctypes.c_int64)

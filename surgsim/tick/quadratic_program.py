@@ -17,10 +17,10 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from surgsim.array import Array
 from surgsim.compiled import compiled
 from surgsim.tick.algebra import factor, norm
 
-Array = NDArray[np.float64]
 Ids = NDArray[np.int64]
 
 SOLVED = 1

@@ -13,9 +13,9 @@ Source: Murray, Li and Sastry, A Mathematical Introduction to Robotic Manipulati
 
 import math
 
+from surgsim.array import Array
 from surgsim.compiled import compiled
 from surgsim.tick.algebra import cross, norm
-from surgsim.tick.arrays import Array
 from surgsim.tick.scratch import scratch
 
 _SERIES = 1e-4

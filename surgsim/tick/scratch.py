@@ -16,7 +16,8 @@ from numba.core import cgutils
 from numba.extending import lower_builtin, type_callable
 from numba.np.arrayobj import make_array, populate_array
 
-from surgsim.tick.arrays import MOST_JOINTS, Array
+from surgsim.array import Array
+from surgsim.tick.arrays import MOST_JOINTS
 
 MOST_ROWS = MOST_JOINTS + 1
 """Most rows and columns of a scratch matrix."""

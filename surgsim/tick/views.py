@@ -9,9 +9,10 @@ from numba import carray, types  # type: ignore[attr-defined]
 from numba.core import cgutils
 from numba.extending import intrinsic, overload
 
+from surgsim.array import Array
 from surgsim.compiled import compiled
 from surgsim.tick.algebra import cross
-from surgsim.tick.arrays import Array, Ids, Numbers, Record, World
+from surgsim.tick.arrays import Ids, Numbers, Record, World
 from surgsim.tick.scratch import scratch
 
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from surgsim.array import Array
 from surgsim.columns import Block, joints, scalar, vector
 from surgsim.display import joined_names
 from surgsim.errors import Outcome, UnknownNameError, not_held
@@ -16,7 +17,6 @@ from surgsim.packages import require
 if TYPE_CHECKING:
     import pandas as pd
 
-Array = NDArray[np.float64]
 
 TIMING_COLUMNS = ("control_time_s",)
 """Columns that measure the machine, not the experiment: they differ between two equal runs."""

@@ -41,7 +41,8 @@ class Trial:
         outcome: Name of the outcome.
         t_s: When the run ended, simulated time [s].
         detail: More about the outcome.
-        metrics: Metrics by name; None where the run does not define one.
+        metrics: Metrics by name, of several arms with the arm's name and `_` before it; None where the run
+            does not define one.
     """
 
     scenario: str
@@ -64,9 +65,9 @@ def cost(trials: Iterable[Trial], weights: Weights = WEIGHTS) -> float:
             + mean over completed runs of [ln(e_rcm + e_0) + ln(e_tip + e_0) + R sum_i max(0, s_i - s_0)]
 
     with the RMS errors e [mm], the time t at which a run ended [s], and the shares s_i of ticks in which a
-    torque changes faster than its published limit, and in which one is cut at its limit. A metric that a
-    scenario does not define adds nothing. F, E, e_0, s_0 and R are `failure`, `early`, `floor_mm`, `allowed`
-    and `rough` of `weights`.
+    torque changes faster than its published limit, and in which one is cut at its limit. Of several arms the
+    mean of their terms counts. A metric that a scenario does not define adds nothing. F, E, e_0, s_0 and R
+    are `failure`, `early`, `floor_mm`, `allowed` and `rough` of `weights`.
 
     Source: ours; a sum of logarithms weighs ratios of errors alike, whatever their sizes.
     """
@@ -79,7 +80,22 @@ def cost(trials: Iterable[Trial], weights: Weights = WEIGHTS) -> float:
 
 
 def _of_completed(metrics: Mapping[str, float | None], weights: Weights) -> float:
-    errors = [error for name in ERRORS if (error := metrics.get(name)) is not None]
-    shares = [share for name in SHARES if (share := metrics.get(name)) is not None]
-    rough = sum(max(0.0, share - weights.allowed) for share in shares)
-    return sum(math.log(error + weights.floor_mm) for error in errors) + weights.rough * rough
+    errors = sum(
+        _mean(math.log(error + weights.floor_mm) for error in _of_arms(metrics, name)) for name in ERRORS
+    )
+    rough = sum(
+        _mean(max(0.0, share - weights.allowed) for share in _of_arms(metrics, name)) for name in SHARES
+    )
+    return errors + weights.rough * rough
+
+
+def _of_arms(metrics: Mapping[str, float | None], name: str) -> list[float]:
+    """The values of a metric that are defined: one, or of several arms one for each."""
+    found = [value for key, value in metrics.items() if key == name or key.endswith(f"_{name}")]
+    return [value for value in found if value is not None]
+
+
+def _mean(values: Iterable[float]) -> float:
+    """Their mean; 0 of none."""
+    found = list(values)
+    return math.fsum(found) / len(found) if found else 0.0

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Callable, Sequence
 
-from surgsim.scenario.schema import Scenario
+from surgsim.scenario.arms import Experiment, each_arm
 from surgsim.tuning.gains import RANGE, Gain, Values
 from surgsim.tuning.trials import Report, Trials
 from surgsim.tuning.tune import cases_of
@@ -53,9 +53,9 @@ def most_runs(tuning: Tuning) -> int:
     return len(tuning.scenarios) * sum(1 + math.ceil(math.log2(most)) for most in levels if most > 0)
 
 
-def _most_delay(scenarios: Sequence[Scenario]) -> int:
+def _most_delay(scenarios: Sequence[Experiment]) -> int:
     """The most steps of delay; none where torques do not act."""
-    if not all(scenario.plant.uses_torque for scenario in scenarios):
+    if not all(arm.plant.uses_torque for scenario in scenarios for arm in each_arm(scenario)):
         return 0
     return math.floor(DELAY_MOST_S / whole_step_s(scenarios) + 1e-9)
 
@@ -64,9 +64,9 @@ def _scaled(gains: Sequence[Gain], values: Values, factor: float) -> Values:
     return {gain.key: gain.scaled(values[gain.key], factor) for gain in gains}
 
 
-def whole_step_s(scenarios: Sequence[Scenario]) -> float:
+def whole_step_s(scenarios: Sequence[Experiment]) -> float:
     """The shortest time that is a whole number of control periods in every scenario [s]."""
-    return math.lcm(*(round(scenario.control_period_s * _NS) for scenario in scenarios)) / _NS
+    return math.lcm(*(round(scenario.simulation.control_period_s * _NS) for scenario in scenarios)) / _NS
 
 
 def last_passed(passes: Callable[[int], bool], most: int) -> int:

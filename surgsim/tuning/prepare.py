@@ -1,16 +1,19 @@
 """What is asked of a tuning, checked before anything is run."""
 
+import re
+
 from surgsim.catalog import check_name
 from surgsim.compare.suite import parse_seeds
 from surgsim.errors import ScenarioError, SurgsimError
 from surgsim.models.robot import robot_joints
 from surgsim.runs.parts import check_parts
-from surgsim.scenario.load import load_controller, load_scenario
-from surgsim.scenario.schema import Scenario
+from surgsim.scenario.arms import Experiment, each_arm
+from surgsim.scenario.load import load_controller, load_experiment
 from surgsim.tuning.gains import gains_of
 from surgsim.tuning.tuning import Tuning, Wish
 
 MOST_SEED = 2**32 - 1
+_OF_AN_ARM = re.compile(r"arms\.\d+\.controller\b")
 
 
 def prepare(wish: Wish) -> Tuning:
@@ -26,8 +29,8 @@ def prepare(wish: Wish) -> Tuning:
         raise SurgsimError(f"--seed: {wish.seed} is not allowed: must be 0 to {MOST_SEED}")
     scenarios = _scenarios(wish)
     check_parts(scenarios)
-    controller = scenarios[0].controller
-    joints = sorted({robot_joints(scenario.robot) for scenario in scenarios})
+    controller = each_arm(scenarios[0])[0].controller
+    joints = sorted({robot_joints(arm.robot) for scenario in scenarios for arm in each_arm(scenario)})
     if len(joints) > 1:
         arms = " and ".join(map(str, joints))
         raise SurgsimError(f"--scenario: arms of {arms} joints; tune for arms of one number of joints")
@@ -50,7 +53,7 @@ def prepare(wish: Wish) -> Tuning:
     return tuning
 
 
-def _scenarios(wish: Wish) -> list[Scenario]:
+def _scenarios(wish: Wish) -> list[Experiment]:
     try:
         seeds = parse_seeds(wish.seeds)
     except ValueError as error:
@@ -58,7 +61,7 @@ def _scenarios(wish: Wish) -> list[Scenario]:
     found, names = [], set()
     for source in wish.scenarios:
         loaded = [
-            load_scenario(source, controller=wish.controller, assignments=wish.settings, seed=seed)
+            load_experiment(source, controller=wish.controller, assignments=wish.settings, seed=seed)
             for seed in seeds
         ]
         if loaded[0].name in names:
@@ -73,5 +76,5 @@ def _check_setting(setting: str) -> None:
     key = setting.partition("=")[0].strip()
     if key == "seed":
         raise ScenarioError(f"--set {setting}", "the seeds of the runs are given by --seeds")
-    if key == "controller":
+    if key == "controller" or _OF_AN_ARM.match(key):
         raise ScenarioError(f"--set {setting}", "the controller is the command's first argument")

@@ -4,9 +4,8 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 from cmaes import CMA
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from surgsim.array import Array
 
 SIGMA = 0.3
 """First step, as a share of the way from the start to the edge of the range."""

@@ -13,7 +13,7 @@ from surgsim.errors import SurgsimError
 from surgsim.recording.files import replacing, write_file
 from surgsim.recording.sealed import read_sealed
 from surgsim.runs.provenance import provenance_of
-from surgsim.scenario.schema import Scenario
+from surgsim.scenario.arms import Experiment
 from surgsim.tuning.cost import ERRORS, SHARES, Trial
 
 RunJobs = Callable[[Sequence[Job]], Iterator[Done]]
@@ -22,7 +22,7 @@ Report = Callable[[str], None]
 """Called with the outcome of each run that is done."""
 
 METRICS = (*ERRORS, *SHARES, "torque_rate_median_nm_per_s", "torque_total_mean_nm")
-"""Metrics that are kept of every run."""
+"""Metrics that are kept of every run, of several arms those of each with its name before them."""
 _KEYS = {*Trial.__dataclass_fields__, "scenario_sha256", "code_sha256"}
 
 
@@ -38,7 +38,7 @@ class Case:
         refusal: Why there is no scenario.
     """
 
-    scenario: Scenario | None
+    scenario: Experiment | None
     name: str
     seed: int
     told: Mapping[str, Any]
@@ -90,7 +90,7 @@ class Trials:
                 report(line["outcome"])
         return [found[place] for place in range(len(cases))]
 
-    def _key(self, case: Case, scenario: Scenario) -> tuple[str, str]:
+    def _key(self, case: Case, scenario: Experiment) -> tuple[str, str]:
         """Hashes of scenario and code; a candidate changes numbers alone, and so not the code."""
         whose = (case.name, case.seed)
         if whose not in self._codes:
@@ -133,13 +133,14 @@ def _summary(folder: Path) -> dict[str, Any]:
 
 def _line(case: Case, key: tuple[str, str], summary: Mapping[str, Any]) -> dict[str, Any]:
     outcome, metrics = summary["outcome"], summary["metrics"]
+    arms = [f"{arm}_" for arm in summary.get("arms") or ()] or [""]
     trial = Trial(
         scenario=case.name,
         seed=case.seed,
         outcome=outcome["name"],
         t_s=outcome["t_s"],
         detail=outcome["detail"],
-        metrics={name: metrics.get(name) for name in METRICS},
+        metrics={f"{of}{name}": metrics.get(f"{of}{name}") for of in arms for name in METRICS},
     )
     return {**case.told, **asdict(trial), "scenario_sha256": key[0], "code_sha256": key[1]}
 

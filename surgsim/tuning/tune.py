@@ -7,18 +7,17 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from surgsim.array import Array
 from surgsim.errors import ScenarioError
-from surgsim.scenario.load import load_scenario
-from surgsim.scenario.schema import Scenario
+from surgsim.scenario.arms import Experiment
+from surgsim.scenario.load import load_experiment
 from surgsim.tuning.cost import cost
 from surgsim.tuning.gains import Values
 from surgsim.tuning.search import minimise
 from surgsim.tuning.trials import Case, Report, RunJobs, Trials
 from surgsim.tuning.tuning import Candidate, Tuning
 
-Array = NDArray[np.float64]
 EVALUATIONS = "evaluations.jsonl"
 
 
@@ -61,7 +60,7 @@ def cases_of(tuning: Tuning, number: int, values: Values, delay_s: float = 0.0) 
     for base in tuning.scenarios:
         try:
             own = values == tuning.start
-            scenario = base if own else load_scenario(base, controller=tuning.tuned(values))
+            scenario = base if own else load_experiment(base, controller=tuning.tuned(values))
             if delay_s > 0.0:
                 scenario = with_delay(scenario, delay_s)
         except ScenarioError as error:
@@ -70,8 +69,8 @@ def cases_of(tuning: Tuning, number: int, values: Values, delay_s: float = 0.0) 
             yield Case(scenario=scenario, name=base.name, seed=base.seed, told=told)
 
 
-def with_delay(scenario: Scenario, delay_s: float) -> Scenario:
-    """`scenario` with torques that come so much later than they do there [s]."""
+def with_delay(scenario: Experiment, delay_s: float) -> Experiment:
+    """`scenario` with torques that come so much later than they do there [s], of every arm."""
     tree = scenario.resolved()
     tree["disturbances"].append({"type": "actuation_delay", "delay_s": delay_s})
-    return load_scenario(tree)
+    return load_experiment(tree)

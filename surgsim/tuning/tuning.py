@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 from surgsim.compare.job import BROKEN
 from surgsim.control.controller import ControllerConfig
-from surgsim.scenario.schema import Scenario
+from surgsim.scenario.arms import Experiment
 from surgsim.tuning.cost import Trial
 from surgsim.tuning.gains import Gain, Values, with_values
 
@@ -76,7 +76,7 @@ class Tuning:
 
     Attributes:
         wish: What was asked for.
-        scenarios: The runs of the controller as it is, one for each scenario and seed.
+        scenarios: The runs of the controller as it is, one for each scenario and seed; it drives every arm.
         controller: The controller as it is.
         gains: What is searched.
         tried: All candidates, in their order; the first is the controller as it is.
@@ -84,7 +84,7 @@ class Tuning:
     """
 
     wish: Wish
-    scenarios: Sequence[Scenario]
+    scenarios: Sequence[Experiment]
     controller: ControllerConfig
     gains: Sequence[Gain]
     tried: list[Candidate] = field(default_factory=list)

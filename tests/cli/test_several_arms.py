@@ -17,6 +17,7 @@ from surgsim.compare.table import Row, read_rows
 from surgsim.export.overlay import figures
 from surgsim.metrics.catalog import METRICS, evaluate, of_one_arm
 from surgsim.recording.blueprint import blueprint
+from surgsim.recording.pair import _blueprint
 from surgsim.recording.read import read_recording
 from surgsim.recording.replay import Replay
 from surgsim.recording.scene import rebuild_all, scenario_of
@@ -80,15 +81,65 @@ def test_all_have_done_their_task_only_if_each_has(trace):
     assert verdict.reason.startswith("left: the path was followed, right: tip_error_max_mm 99 exceeds 3")
 
 
-def test_inspect_has_a_column_for_each_arm_and_refuses_a_pair(folder, told, capsys):
+def test_inspect_has_a_column_for_each_arm(folder, told):
     status, printed = told("inspect", folder)
     assert status == 0
     assert printed.splitlines()[1].split() == ["metric", "left", "right", "meaning"]
     assert "left: Done: " in printed
     assert "right: Done: " in printed
     assert "metrics computed again from the recording equal those stored in it" in printed
-    assert main(["inspect", str(folder), str(folder)]) == 2
-    assert "a run of several arms; two runs side by side are of one arm each" in capsys.readouterr().err
+
+
+@pytest.fixture(scope="module")
+def moved(tmp_path_factory) -> Path:
+    """The same run with the right arm's path 1 mm to the side."""
+    path = tmp_path_factory.mktemp("several") / "moved"
+    assert main(["run", NAME, "--out", str(path), *WORDS, "--set", "arms.1.task.start_m.0=0.051"]) == 0
+    return path
+
+
+def test_two_runs_of_the_same_arms_are_compared_arm_by_arm(folder, moved, told):
+    status, printed = told("inspect", folder, moved)
+    assert status == 0
+    lines = printed.splitlines()
+    assert next(line.split() for line in lines if "start_m" in line)[0] == "arms.1.task.start_m"
+    assert [line for line in lines if line.startswith("Metrics of ")] == [
+        "Metrics of left",
+        "Metrics of right",
+    ]
+    (left, right) = [float(line.split()[-2]) for line in lines if line.startswith("largest distance between")]
+    assert left < 0.01
+    assert right == pytest.approx(1.0, abs=0.01)
+    told_json = json.loads(told("inspect", folder, moved, "--json")[1])
+    assert set(told_json["b_minus_a"]) == {f"{arm}_{name}" for arm in ("left", "right") for name in METRICS}
+    assert told_json["b_minus_a"]["left_tip_error_rms_mm"] == pytest.approx(0.0, abs=1e-6)
+
+
+def test_two_runs_of_the_same_arms_are_shown_side_by_side(folder, moved, told, tmp_path):
+    file = tmp_path / "pair.rrd"
+    assert told("inspect", folder, moved, "--out", file)[0] == 0
+    held = {chunk.entity_path for chunk in RrdReader(file).stream()}
+    alone = {chunk.entity_path for chunk in RrdReader(folder / "recording.rrd").stream()}
+    alone = {path for path in alone if not path.startswith(("/surgsim", "/__"))}
+    for side in "ab":
+        assert {path for path in held if path.startswith(f"/{side}/")} == {f"/{side}{path}" for path in alone}
+    shown = [
+        content.removeprefix("+ ").removesuffix("/**")
+        for view in _views(_blueprint([read_recording(run).trace for run in (folder, moved)]).root_container)
+        for content in ([view.contents] if isinstance(view.contents, str) else view.contents)
+        if content.startswith("+ /")
+    ]
+    assert {f"/{side}/{arm}/errors_mm" for side in "ab" for arm in ("left", "right")} <= set(shown)
+    assert [path for path in shown if not any(entity.startswith(path) for entity in held)] == []
+
+
+def test_runs_of_other_arms_are_not_set_side_by_side(folder, tmp_path, capsys):
+    alone = tmp_path / "alone"
+    short = [word for key, value in SHORT.items() for word in ("--set", f"task.{key}={value}")]
+    assert main(["run", "circle_panda", "--out", str(alone), *short]) == 0
+    assert main(["inspect", str(folder), str(alone)]) == 2
+    told = " ".join(capsys.readouterr().err.split())
+    assert f"{folder} is a run of arms left and right, {alone} of one arm: two runs side by side have" in told
 
 
 def test_the_recording_has_both_arms_ports_paths_and_signals(folder):
@@ -206,10 +257,10 @@ def test_exports_hold_both_arms_or_say_why_not(folder, trace, told, tmp_path, ca
     assert "a run of several arms; episodes are of runs of one" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("words", [["--live", "127.0.0.1:1"], ["--operator", "keyboard"]])
-def test_what_shows_or_asks_one_arm_alone_is_refused(words, capsys):
-    assert main(["run", NAME, *words]) == 2
-    assert f"{NAME}: {words[0]} takes a scenario of one arm" in capsys.readouterr().err
+def test_a_person_operates_one_arm_alone(capsys):
+    assert main(["run", NAME, "--operator", "keyboard"]) == 2
+    said = " ".join(capsys.readouterr().err.split())
+    assert f"{NAME}: --operator takes a scenario of one arm; several are watched with --live" in said
 
 
 def test_check_prints_a_scenario_that_is_the_same_again(told, tmp_path):

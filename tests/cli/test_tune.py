@@ -10,9 +10,11 @@ import pytest
 from batches import Here, short_run
 
 from surgsim.cli.main import main
+from surgsim.metrics.catalog import evaluate
 from surgsim.recording.sealed import read_sealed
 from surgsim.runs.stop import Stopped
-from surgsim.scenario.load import load_controller
+from surgsim.scenario.load import load_controller, load_experiment
+from surgsim.simulate.loop import simulate
 
 LOAD = "disturbances=[{type: payload, mass_kg: 0.4, spread: 0.5}]"
 SETTINGS = [word for setting in (*short_run(0.25), LOAD) for word in ("--set", setting)]
@@ -93,6 +95,31 @@ def test_a_short_tuning_leaves_a_controller_that_runs_and_says_where_it_comes_fr
         assert any(name in line for line in printed.out.splitlines())
     assert "delay margin: " in printed.out
     assert "tuning rcm_inverse_dynamics: 6 of 6 runs" in printed.err
+
+
+def test_one_controller_is_tuned_for_all_arms_of_a_scenario(here, capsys):
+    here()
+    task = {"duration_s": 0.25, "ramp_s": 0.1, "hold_start_s": 0.0, "hold_end_s": 0.0, "radius_m": 0.002}
+    words = [f"arms.{k}.task.{key}={value}" for k in (0, 1) for key, value in task.items()]
+    settings = [word for setting in ("theatre=false", *words) for word in ("--set", setting)]
+    tune = ["tune", "rcm_inverse_dynamics", "--scenario", "two_ports_panda", *settings, "--seeds", "1000"]
+    assert main([*tune, "--keys", "torque_law.rcm_stiffness_per_s2", "--budget", "3", "--out", "t"]) == 0
+    assert "left_rcm_error_rms_mm" in capsys.readouterr().out
+    found = summary("t")
+    after = found["gains"]["torque_law.rcm_stiffness_per_s2"]["after"]
+    assert found["candidates"] == 3
+    assert found["margins"]["delay_s"] is not None
+    of_arms = {
+        f"{arm}_{name}" for arm in ("left", "right") for name in ("rcm_error_rms_mm", "tip_error_rms_mm")
+    }
+    assert of_arms <= set(lines("t")[0]["metrics"])
+    scenario = load_experiment("two_ports_panda", controller=f"t/{FILE}", assignments=words, seed=1000)
+    assert [arm.controller.torque_law.rcm_stiffness_per_s2 for arm in scenario.arms] == [after, after]
+    metrics = evaluate(simulate(scenario)).values
+    for name in of_arms:
+        assert found["metrics"]["two_ports_panda"]["after"][name] == pytest.approx(metrics[name], rel=1e-9)
+    assert main([*tune, "--budget", "3", "--set", "arms.1.controller=pinv", "--out", "u"]) == 2
+    assert "arms.1.controller=pinv: the controller is the command's first argument" in capsys.readouterr().err
 
 
 def test_what_is_reported_is_what_the_written_file_gives(here, capsys):

@@ -6,7 +6,7 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 
 from surgsim.env.gymnasium import SurgsimEnv, environment_id
-from surgsim.scenario.load import of_one_arm, shipped
+from surgsim.scenario.load import shipped
 
 STOP = "safety.tip_error_max_m=0.001"
 
@@ -23,7 +23,7 @@ def test_ids_are_derived_from_the_scenarios():
     assert environment_id("circle_lwr4plus") == "surgsim/Circle-LWR4Plus-v0"
     assert environment_id("circle_panda") == "surgsim/Circle-Panda-v0"
     ours = {name for name in gymnasium.registry if name.startswith("surgsim/")}
-    assert ours == {environment_id(name) for name in of_one_arm(shipped())}
+    assert ours == {environment_id(name) for name in shipped()}
 
 
 def test_an_id_with_its_module_needs_no_import():

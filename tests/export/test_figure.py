@@ -7,9 +7,11 @@ import pytest
 from matplotlib import rcParams
 from PIL import Image
 
+from surgsim.errors import SurgsimError
 from surgsim.export import figure as drawing
 from surgsim.export.figure import _by_controller, _fitting, _over_time
 from surgsim.export.paper_style import COLOURS, journal_style
+from surgsim.export.study_figure import study_figure
 from surgsim.export.subjects import find
 
 OKABE_ITO = [
@@ -126,3 +128,60 @@ def test_what_makes_no_figure(run_folder, made_results, unrecorded, told, tmp_pa
     assert told(run_folder, "--figure", tmp_path / "x.jpg")[1].endswith("Allowed: .pdf, .png, .svg.\n")
     assert list(tmp_path.iterdir()) == []
     assert drawing.SUFFIXES == (".pdf", ".png", ".svg")
+
+
+class Rows:
+    """A study with these tables."""
+
+    def __init__(self, **tables):
+        self.path, self.tables, self._rows = "made", tuple(tables), tables
+
+    def rows(self, table):
+        name = table or self.tables[0]
+        return name, self._rows[name]
+
+
+def swept(places, kinds, repeats=1):
+    """A table of an error over a delay, for each kind."""
+    return [
+        {"kind": kind, "seed": seed, "delay_ms": delay, "outcome": "completed", "error_mm": delay + k}
+        for k, kind in enumerate(kinds)
+        for seed in range(repeats)
+        for delay in places
+    ]
+
+
+def study_axes(study, table=None, columns=()):
+    with journal_style():
+        return study_figure(study, table, columns, "column").get_axes()
+
+
+def test_a_study_s_table_is_lines_over_what_was_varied():
+    (ax,) = study_axes(Rows(sweep=swept((0, 100, 300), ("a", "b"))))
+    assert [line.get_label() for line in ax.get_lines()] == ["a, seed 0", "b, seed 0"]
+    np.testing.assert_array_equal(ax.get_lines()[1].get_xydata(), [[0, 1], [100, 101], [300, 301]])
+    assert (ax.get_xlabel(), ax.get_ylabel()) == ("delay [ms]", "error [mm]")
+
+
+def test_another_table_of_a_study_is_a_point_beside_each_row_s_name():
+    rows = [{"path": "circle", "home": 1, "share": 0.5}, {"path": "circle", "home": 2, "share": None}]
+    (ax,) = study_axes(Rows(homes=rows))
+    assert [text.get_text() for text in ax.get_yticklabels()] == ["circle, home 1", "circle, home 2"]
+    assert [len(line.get_xdata()) for line in ax.get_lines()] == [1, 0]
+
+
+def test_a_table_that_is_too_long_for_a_figure_names_those_that_are_not():
+    study = Rows(every=swept((0, 100, 300), "abcdefghi", 2), few=swept((0, 1, 2), "ab"))
+    with pytest.raises(SurgsimError, match=r"'every' of made has 54 rows, more .* another: few$"):
+        study_axes(study)
+    assert study_axes(study, "few")
+    with pytest.raises(SurgsimError, match=r"--metric: 'errors_mm' is not a column of numbers of this table"):
+        study_axes(study, "few", ["errors_mm"])
+
+
+def test_every_study_of_the_results_has_a_figure(told, tmp_path, request):
+    for folder, table in (("vprnn", "comparison"), ("bilateral_schemes", "winners")):
+        study = request.config.rootpath / "results" / folder
+        file = tmp_path / f"{folder}.svg"
+        assert told(study, "--study-table", table, "--figure", file) == (0, "")
+        assert file.stat().st_size > 10_000

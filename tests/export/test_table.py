@@ -149,3 +149,13 @@ def test_what_makes_no_table(run_folder, made_results, told, tmp_path):
     assert status == 2
     assert error.startswith("surgsim: 'rcm_error_rsm_mm' is not a metric. Known: ")
     assert list(tmp_path.iterdir()) == []
+
+
+def test_columns_of_a_study_beside_the_names_of_its_rows(told, tmp_path, request):
+    folder, file = request.config.rootpath / "results" / "vprnn", tmp_path / "x.csv"
+    assert told(folder, "--metric", "rcm_max_mm,outcome", "--table", file)[0] == 0
+    head = file.read_text(encoding="utf-8").splitlines()[0]
+    assert head == "level,controller,rcm_max_mm,outcome"
+    status, error = told(folder, "--metric", "rcm_maximum", "--table", tmp_path / "y.csv")
+    assert status == 2
+    assert error.startswith("surgsim: --metric: 'rcm_maximum' is not a column of this table.")

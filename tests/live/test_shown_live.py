@@ -12,6 +12,8 @@ import surgsim
 from surgsim.cli.main import main
 from surgsim.live import showing
 from surgsim.recording.layout import HEADER, TIMELINE
+from surgsim.scenario.load import load_experiment
+from surgsim.simulate.loop import simulate
 
 SHORT = {"task.duration_s": 0.6, "task.ramp_s": 0.2, "task.hold_end_s": 0.1}
 
@@ -65,6 +67,21 @@ def test_the_viewer_is_sent_what_is_recorded(sent, tmp_path):
     plain = surgsim.run(scenario)
     for block in ("q", "tau", "tip"):
         assert np.array_equal(result.trace.block(block), plain.trace.block(block), equal_nan=True)
+
+
+def test_the_viewer_is_sent_what_is_recorded_of_two_arms(sent, tmp_path):
+    settings = {f"arms.{k}.{key}": value for k in (0, 1) for key, value in SHORT.items()}
+    scenario = load_experiment("two_ports_panda", assignments=[f"{k}={v}" for k, v in settings.items()])
+    folder = tmp_path / "run"
+    result = showing.run_shown(scenario, folder, None, realtime=False)
+    live, recorded = _entities(sent), _entities(folder / "recording.rrd")
+    assert set(live) == {name for name in recorded if name.strip("/") != HEADER}
+    for name, (components, _) in live.items():
+        assert components == recorded[name][0], name
+    for arm in ("left", "right"):
+        for name in (f"/scene/{arm}/link7", f"/scene/{arm}/tip", f"/{arm}/signals/q"):
+            assert max(live[name][1]) == max(recorded[name][1]) > 1e9, name
+    assert result.trace.equals(simulate(scenario))
 
 
 def test_a_run_that_fails_is_shown_to_its_end(sent, tmp_path):

@@ -4,9 +4,10 @@ import mujoco
 import numpy as np
 import pytest
 
-from surgsim.models.build import build
+from surgsim.models.build import SharedArm, build, build_shared
 from surgsim.models.collision import abdomen_semi_axes
-from surgsim.models.config import RobotConfig, SceneConfig, TrocarConfig
+from surgsim.models.config import InstrumentConfig, RobotConfig, SceneConfig, TrocarConfig
+from surgsim.plant.between import ArmsWatch
 from surgsim.plant.contacts import ContactWatch, body_gap, is_clear, table_gap
 from surgsim.scenario.load import load_scenario, of_one_arm, shipped
 from surgsim.simulate.setup import prepare
@@ -111,10 +112,12 @@ def test_no_shipped_scenario_starts_in_a_contact(name):
     assert setup.plant.truth().contact is None
 
 
-@pytest.mark.parametrize("robot", ["lwr4plus", "panda"])
-def test_what_is_not_looked_at_again_touches_nothing(robot):
+@pytest.mark.parametrize(
+    ("robot", "more"), [("lwr4plus", ()), ("panda", ()), ("lwr4plus", ("instrument={name: hook_30}",))]
+)
+def test_what_is_not_looked_at_again_touches_nothing(robot, more):
     """Along motions of arm and port the kernel with a memory says what a look at everything says."""
-    scenario = load_scenario(f"circle_{robot}", assignments=("plant={type: kinematic}",))
+    scenario = load_scenario(f"circle_{robot}", assignments=("plant={type: kinematic}", *more))
     setup, rng = prepare(scenario), np.random.default_rng(3)
     plant, limits = setup.plant, setup.scene.limits
     other, record, world = ContactWatch(setup.scene, plant.data), plant.watch.record, plant.world
@@ -155,3 +158,95 @@ def test_a_look_from_outside_between_two_postures_does_not_hide_a_contact():
         hidden += found is not None and is_clear(plant.watch.record, plant.world)
     assert touching > 20
     assert hidden == 0
+
+
+HOOK = InstrumentConfig(name="hook_30")
+DOWN = np.array([1.5708, -0.5236, 0.0, 1.5708, 0.0, -1.0472, 0.0])
+
+
+def _placed(scene, q):
+    """MuJoCo's data with the arm at `q`, and the shaft's end and the tip there (3,) [m]."""
+    data = mujoco.MjData(scene.model)
+    data.qpos[scene.qpos_ids] = q
+    mujoco.mj_kinematics(scene.model, data)
+    return data, data.site_xpos[scene.shaft_end_site], data.site_xpos[scene.tip_site]
+
+
+def test_the_bent_part_s_capsule_goes_from_the_shaft_s_end_to_the_tip():
+    scene = build(SCENE.model_copy(update={"instrument": HOOK}))
+    shapes, (data, end, tip) = scene.shapes, _placed(scene, DOWN)
+    assert shapes.names[-3:] == ("adapter", "shaft", "bent part")
+    row, radius = shapes.shaft + 1, 0.5 * HOOK.shaft_diameter_m
+    assert shapes.radii[row] == radius
+    ends = data.xpos[shapes.bodies[row]] + shapes.ends[row] @ data.body("instrument").xmat.reshape(3, 3).T
+    u = (tip - end) / np.linalg.norm(tip - end)
+    np.testing.assert_allclose(ends, [end, tip - radius * u], atol=1e-12)
+    straight = build(SCENE).shapes
+    of_bent = {(shapes.names[i], shapes.names[j]) for i, j in shapes.pairs if row in (i, j)}
+    of_shaft = {(straight.names[i], "bent part") for i, j in straight.pairs if straight.names[j] == "shaft"}
+    assert of_bent == of_shaft
+    assert of_bent
+
+
+def test_a_bent_part_that_passes_the_skin_far_from_the_port_is_contact_with_the_patient():
+    config = SCENE.model_copy(update={"instrument": HOOK})
+    scene = build(config, drawn=False)
+    data, end, tip = _placed(scene, DOWN)
+    watch, patient = ContactWatch(scene, data), scene.shapes.patient
+    top = np.array([0.0, 0.1, 0.0])  # of the skin in the patient's frame, from the abdomen's centre
+    top[2] = patient[2, 2] * np.sqrt(1.0 - np.sum((top[:2] / patient[2, :2]) ** 2))
+    turn = np.array([[patient[1, 0], -patient[1, 1], 0.0], [patient[1, 1], patient[1, 0], 0.0], [0, 0, 1.0]])
+    port = 0.5 * (end + tip) - turn @ top - patient[0]
+    far = np.linalg.norm(0.5 * (end + tip) - port)
+    assert far > 0.1
+    found = watch.look(port)
+    assert found is not None
+    assert found.detail == f"bent part passes the skin {1e3 * far:.1f} mm from the port"
+    assert found.with_patient
+    lifted = watch.look(port - [0.0, 0.0, 0.03])
+    assert lifted is None or "skin" not in lifted.detail
+
+
+@pytest.mark.parametrize(
+    ("instrument", "apart_m", "touched"),
+    [
+        (HOOK, 0.012, "left's bent part touches right's shaft"),
+        (HOOK, 0.018, None),
+        (InstrumentConfig(shaft_length_m=0.39), 0.012, None),
+    ],
+)
+def test_the_bent_part_touches_another_arm_beside_the_shaft(instrument, apart_m, touched):
+    """The right shaft crosses where the left one ends, `apart_m` beside it, where the hook points."""
+    hook = build(SceneConfig(robot=RobotConfig(name="lwr4plus"), instrument=HOOK, theatre=False), drawn=False)
+    left = np.array([*DOWN[:6], 0.5 * np.pi])  # the hook points across the plane of both shafts
+    _, end, tip = _placed(hook, left)
+    aside = np.array([np.sign(tip[0] - end[0]), 0.0, 0.0])
+    assert (tip - end) @ aside > 0.0074
+    place = end + apart_m * aside
+
+    right = np.array([DOWN[0], DOWN[1] + 0.35, *DOWN[2:]])
+
+    def scenes(base):
+        names = ("left", "right")
+        robots = (
+            RobotConfig(name="lwr4plus"),
+            RobotConfig(name="lwr4plus", base_position_m=tuple(base), base_yaw_rad=np.pi),
+        )
+        instruments = (instrument, InstrumentConfig())
+        arms = [
+            SharedArm(name=name, config=SceneConfig(robot=robot, instrument=tool, theatre=False))
+            for name, robot, tool in zip(names, robots, instruments, strict=True)
+        ]
+        built = build_shared(arms, drawn=False)
+        data = mujoco.MjData(built[0].model)
+        for scene, q in zip(built, (left, right), strict=True):
+            data.qpos[scene.qpos_ids] = q
+        mujoco.mj_kinematics(built[0].model, data)
+        return list(zip(names, built, strict=True)), data, built[1]
+
+    arms, data, of_right = scenes(np.zeros(3))
+    shaft = data.site_xpos[of_right.tip_site] - data.site_xpos[of_right.shaft_entry_site]
+    middle = data.site_xpos[of_right.tip_site] - 0.1 * shaft / np.linalg.norm(shaft)
+    arms, data, _ = scenes(place - middle)
+    found = ArmsWatch(arms, data, frozenset(("left", "right"))).look()
+    assert (found is None) if touched is None else (found or "").startswith(touched), found

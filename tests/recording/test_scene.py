@@ -6,6 +6,9 @@ from rerun.chunk import RrdReader
 
 from surgsim.recording.scene import body_poses, rcm_errors, rebuild, sampled_rows, scenario_of
 from surgsim.recording.shapes import Triangles, geom_triangles
+from surgsim.recording.write import write_recording
+from surgsim.scenario.load import load_scenario
+from surgsim.simulate.loop import simulate
 from surgsim.trace.trace import Trace
 
 
@@ -68,7 +71,7 @@ def in_world(model: mujoco.MjModel, poses, site: int) -> np.ndarray:
 
 
 def test_rcm_error_vectors_have_the_length_of_the_column(trace: Trace) -> None:
-    vectors = rcm_errors(trace.block("tip"), trace.block("wrist"), trace.block("trocar"))
+    vectors = rcm_errors(*(trace.block(name) for name in ("tip", "wrist", "trocar")), angled=False)
     assert_allclose(np.linalg.norm(vectors, axis=1), trace["rcm_error_m"], atol=1e-12)
     assert np.abs(vectors).max() > 1e-6
 
@@ -87,3 +90,18 @@ def test_the_scene_is_recorded(recording) -> None:
     assert {"/scene/desired_path", "/scene/actual_path", "/scene/tip", "/scene/rcm_error_x20"} <= paths
     assert {"/signal_limits/q", "/signal_limits/v", "/signal_limits/tau", "/errors_mm", "/log"} <= paths
     assert RrdReader(recording).blueprints()
+
+
+def test_the_rcm_error_s_arrow_of_an_angled_tip_goes_to_the_shaft(tmp_path) -> None:
+    assignments = ["instrument={name: hook_30}", "task.duration_s=2.0", "task.hold_end_s=0.0"]
+    trace = simulate(load_scenario("circle_lwr4plus", controller="vprnn", assignments=assignments))
+    write_recording(tmp_path / "recording.rrd", trace, {})
+    chunks = RrdReader(tmp_path / "recording.rrd").stream().filter(content=["/scene/rcm_error_x20"])
+    batches = [chunk.to_record_batch() for chunk in chunks]
+    (drawn,) = [b.column("Arrows3D:vectors") for b in batches if "Arrows3D:vectors" in b.schema.names]
+    vectors = np.array(drawn.to_pylist(), dtype=float).reshape(-1, 3) / 20.0
+    rate = scenario_of(trace).recording.scene_rate_hz
+    rows = sampled_rows(len(trace), rate * trace.meta.control_period_s)
+    expected = trace["rcm_error_m"][rows]
+    assert expected.max() > 1e-3
+    assert_allclose(np.linalg.norm(vectors, axis=1), expected, rtol=1e-5, atol=1e-9)

@@ -1,6 +1,8 @@
 """Recordings are made in memory: no thread and no memory of one stays, and a disk that refuses says so."""
 
 import os
+import subprocess
+import sys
 import threading
 from pathlib import Path
 
@@ -75,3 +77,13 @@ def test_a_disk_that_refuses_is_told_in_one_line_and_nothing_is_left(trace, metr
         write_recording(tmp_path / "x.rrd", trace, metrics)
     assert str(error.value) == f"{tmp_path / 'x.rrd'}: cannot be written: No space left on device"
     assert os.listdir(tmp_path) == []
+
+
+def test_the_layout_is_active_and_not_the_default_alone(tmp_path):
+    """A browser has made a layout of its own by the time that a default one arrives."""
+    with stream_to(tmp_path / "x.rrd", rrb.Blueprint(rrb.Spatial3DView(name="of the test"))):
+        pass
+    viewer = "import sys; from rerun_cli.__main__ import main; sys.exit(main())"
+    words = [sys.executable, "-P", "-c", viewer, "rrd", "print", "-v", str(tmp_path / "x.rrd")]
+    done = subprocess.run(words, capture_output=True, text=True, timeout=100, check=True)
+    assert "make_active: true, make_default: true" in done.stdout

@@ -155,6 +155,36 @@ def test_a_tip_that_leaves_no_shaft_in_the_port_is_refused():
     check_through_port(np.array([0.0, 0.0, deepest]), "the start at", hook, trocar)
 
 
-def test_an_insertion_along_the_port_s_axis_is_refused():
-    with pytest.raises(SurgsimError, match="task 'insertion' takes the tip along the port's axis"):
-        prepare(load_scenario("insertion_lwr4plus", assignments=[HOOK, "start={}"]))
+def test_an_insertion_leads_the_shaft_s_end_along_the_axis_and_to_the_target():
+    """By MuJoCo alone: the shaft stays on the port's axis, the bent tip ahead of its end."""
+    scenario = load_scenario("insertion_lwr4plus", assignments=[HOOK, "task.duration_s=4.0"])
+    trace, own = simulate(scenario), OwnKinematics()
+    assert trace.meta.ending.outcome.name == "COMPLETED", trace.meta.ending
+    port, target = np.array(scenario.trocar.position_m), np.array(scenario.task.target_from_port_m)
+    places = np.array([own.points(q) for q in trace.block("q")[::10]])
+    entry, end, tip = places[:, 0], places[:, 1], places[:, 2]
+    np.testing.assert_allclose(end[0], scenario.task.start_m, atol=1e-5)
+    np.testing.assert_allclose(end[-1], port + target, atol=1e-5)
+    first = trace["insertion_phase"][::10] < 2.0
+    for points in (entry[first], end[first]):
+        assert np.linalg.norm((points - port)[:, :2], axis=1).max() < 2e-5
+    assert (end[first] - tip[first])[:, 2].min() > 0.012
+    assert np.linalg.norm((tip - port)[first, :2], axis=1) == pytest.approx(0.0075, abs=2e-5)
+    ahead = (end[:, 2] > port[2]) & (tip[:, 2] < port[2])
+    assert ahead.sum() > 3  # the tip has passed the port, the shaft's end not
+    asked = trace.block("tip_ref")[::10] - tip + end - port  # where the shaft's end is asked to be
+    np.testing.assert_allclose(-asked[first, 2], trace["insertion_depth_m"][::10][first], atol=1e-12)
+    assert compute_metrics(trace)["rcm_error_max_mm"] < 0.01
+    assert compute_metrics(trace)["tip_error_max_mm"] < 0.01
+
+
+def test_a_bent_part_that_is_wider_than_the_bore_is_not_inserted_through_a_wall():
+    wall = (HOOK, "trocar.wall={}", "task.duration_s=4.0")
+    with pytest.raises(
+        SurgsimError, match=r"bent part is 15\.5 mm wide with the shaft, and the bore 8\.9 mm"
+    ):
+        prepare(load_scenario("insertion_lwr4plus", assignments=wall))
+    scenario = load_scenario("insertion_lwr4plus", assignments=[*wall, "trocar.bore_diameter_m=0.0155"])
+    trace = simulate(scenario)
+    assert trace.meta.ending.outcome.name == "COMPLETED", trace.meta.ending
+    assert compute_metrics(trace)["rcm_error_max_mm"] < 0.1

@@ -9,6 +9,7 @@ import pytest
 from surgsim.errors import Outcome, ScenarioError, SurgsimError, UnknownNameError
 from surgsim.models.build import SharedArm, build_shared
 from surgsim.plant.between import arms_are_clear, touching_pair
+from surgsim.scenario.arms import experiment_of
 from surgsim.scenario.load import load_experiment, load_scenario
 from surgsim.simulate.loop import Simulation, prepared, simulate
 
@@ -68,6 +69,40 @@ def test_two_arms_that_do_not_meet_are_what_each_is_alone(more):
         assert_same(trace.of(name), simulate(scenario.of(name)), 1e-9)
 
 
+def test_arms_that_follow_velocities_are_what_each_is_alone():
+    """To the last bit, but that the arm that is done first goes on."""
+    scenario = apart(plant={"type": "kinematic"})
+    trace = simulate(scenario)
+    assert trace.meta.ending.outcome is Outcome.COMPLETED
+    for name in scenario.names:
+        assert scenario.of(name).plant.type == "kinematic"
+        assert_same(trace.of(name), simulate(scenario.of(name)), 0.0)
+    assert np.isnan(trace["left_tau1_nm"]).all()
+    assert trace.of("right")["tip_error_m"].max() < 1e-4
+    again = experiment_of(scenario.resolved())
+    assert simulate(again).equals(trace)
+    simulation = Simulation(prepared(scenario))
+    simulation.advance(100)
+    assert simulation.fork().run().equals(trace)
+
+
+def test_arms_that_follow_velocities_meet_where_those_with_dynamics_do(crossed):
+    scenario = load_experiment(
+        "safety/arm_collision", assignments=["theatre=false", "plant={type: kinematic}"]
+    )
+    trace = simulate(scenario)
+    assert trace.meta.ending.outcome is Outcome.ARM_COLLISION
+    assert trace.meta.ending.t_s == pytest.approx(crossed.meta.ending.t_s, abs=0.005)
+    assert trace["left_stopped"].sum() == 0.0
+
+
+def test_the_usual_plant_is_no_part_of_the_hash():
+    usual, other = apart(), apart(plant={"type": "kinematic"})
+    assert "plant" not in usual.resolved()
+    assert usual.sha256() == apart(plant={"type": "dynamic"}).sha256() != other.sha256()
+    assert other.resolved()["plant"] == {"type": "kinematic"}
+
+
 def test_walls_and_real_drives_are_each_arms_own():
     walled = arm("left", "lwr4plus", 0.0, trocar={"wall": {}}, controller="rcm_elastic_dynamics")
     walled["robot"]["drive"] = "real"
@@ -78,6 +113,23 @@ def test_walls_and_real_drives_are_each_arms_own():
     assert_same(trace.of("left"), simulate(scenario.of("left")), 1e-9)
     assert {"left_trocar_force", "left_cannula_x"} <= {block.name for block in trace.blocks}
     assert "right_trocar_force" not in trace
+
+
+def test_each_arm_has_its_own_energy_ledger():
+    """Wall, friction and a payload beside another arm that moves: the books are those of the arm alone."""
+    given = [{"type": "joint_friction"}, {"type": "payload", "mass_kg": 0.3}]
+    walled = arm("left", "lwr4plus", 0.0, trocar={"wall": {}}, disturbances=given)
+    scenario = apart(
+        arms=[walled, arm("right", "panda", FAR_M, duration_s=0.5)],
+        plant={"type": "dynamic", "energy_ledger": True},
+    )
+    trace = simulate(scenario)
+    assert trace.meta.ending.outcome is Outcome.COMPLETED
+    for name in scenario.names:
+        assert_same(trace.of(name), simulate(scenario.of(name)), 1e-9)
+        moved = np.abs(trace[f"{name}_energy_actuator_work_j"]).max()
+        assert np.abs(trace[f"{name}_energy_residual_j"]).max() < 1e-3 * moved
+    assert trace["left_energy_friction_loss_j"][-1] > 0.0 == trace["right_energy_friction_loss_j"][-1]
 
 
 def test_the_run_goes_on_until_every_task_is_done_and_the_others_hold():
@@ -222,7 +274,10 @@ def test_arms_that_touch_at_the_start_are_refused_with_both_names():
 
 REFUSED = {
     "props": ({"props": []}, "props: not beside arms: what an arm grasps or touches is for one arm alone"),
-    "plant": ({"plant": {"type": "kinematic"}}, "plant: not beside arms: several arms share the 'dynamic'"),
+    "kinematic": (
+        {"plant": {"type": "kinematic"}, "disturbances": [{"type": "payload"}]},
+        "disturbances do not act on the 'kinematic' plant: leave them out",
+    ),
     "robot": ({"robot": {"name": "panda"}}, "robot: not beside arms: give it to each of the arms, as arms.0"),
     "one": ({"arms": [arm("left", "panda", 0.0)]}, "arms: "),
     "names": (

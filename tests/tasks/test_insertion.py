@@ -96,6 +96,35 @@ def test_a_start_beside_the_axis_or_inside_is_refused():
             InsertionConfig().build(start, trocar=TROCAR)
 
 
+BENT = np.array([0.0075, 0.002, 0.013])
+
+
+@pytest.mark.parametrize("guidance", ["planned", "hands_on"])
+@pytest.mark.parametrize("t_s", [0.0, 1.7, 4.0, 7.5])
+def test_an_angled_tip_is_asked_to_be_where_it_is_with_the_shaft_s_end_on_its_way(guidance, t_s):
+    """Against the straight instrument whose tip is the shaft's end, the instrument turning as it does."""
+    rng = np.random.default_rng(int(10 * t_s))
+    R, w = _turn(rng), rng.normal(size=3)
+    r = R @ BENT
+    p_WS, v_WS = PORT + 0.01 * AXIS + 1e-3 * rng.normal(size=3), 0.01 * rng.normal(size=3)
+    config = InsertionConfig(depth_m=0.12, target_from_port_m=TARGET, guidance=guidance)
+    straight = config.build(START, trocar=TROCAR).command(t_s, _seen(p_WS, v_WS))
+    task = config.build(START, trocar=TROCAR, p_ST=BENT)
+    assert task.reacts
+    told = Feedback(p_WT=p_WS + r, v_WT=v_WS + np.cross(w, r), R_WT=R, w_WT=w, f_T=np.zeros(3))
+    bent = task.command(t_s, told)
+    np.testing.assert_allclose(bent.p_WTd, straight.p_WTd + r, atol=1e-14)
+    np.testing.assert_allclose(bent.v_WTd, straight.v_WTd + np.cross(w, r), atol=1e-14)
+    np.testing.assert_allclose(bent.a_WTd, straight.a_WTd + np.cross(w, np.cross(w, r)), atol=1e-14)
+    np.testing.assert_allclose(bent.rcm_shift, straight.rcm_shift, atol=1e-14)
+    np.testing.assert_allclose(bent.p_WTd - told.p_WT, straight.p_WTd - p_WS, atol=1e-14)
+
+
+def _turn(rng):
+    R = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+    return R * np.sign(np.linalg.det(R))
+
+
 def test_what_cannot_be_inserted_is_refused_with_the_reason():
     with pytest.raises(SurgsimError, match="task 'insertion' needs a trocar"):
         prepare(load_scenario("insertion_lwr4plus", assignments=["trocar=null"]))

@@ -30,6 +30,19 @@ def test_a_metric_that_is_not_defined_adds_nothing():
     assert cost([run()]) == 0.0
 
 
+def test_of_several_arms_the_mean_of_their_terms_counts():
+    both = run(
+        left_rcm_error_rms_mm=0.99,
+        left_tip_error_rms_mm=None,
+        left_saturated_fraction=0.11,
+        right_rcm_error_rms_mm=0.09,
+        right_tip_error_rms_mm=0.49,
+        right_saturated_fraction=0.0,
+    )
+    expected = 0.5 * (math.log(1.0) + math.log(0.1)) + math.log(0.5) + 20.0 * 0.5 * 0.1
+    assert cost([both]) == pytest.approx(expected)
+
+
 @pytest.mark.parametrize("name", ["torque_rate_over_fraction", "saturated_fraction"])
 def test_a_share_costs_from_one_per_cent_on(name):
     plain = cost([good(0.5, 0.5)])

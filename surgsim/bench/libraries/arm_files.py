@@ -1,16 +1,14 @@
 """The arm as other libraries read it: a URDF of its joints, with the trocar as a frame."""
 
 import mujoco
-import numpy as np
-from numpy.typing import NDArray
 
+from surgsim.array import Array
 from surgsim.models.arm import ArmModel
 from surgsim.models.texts import TIP
 from surgsim.models.texts import urdf_of as urdf_with
 
 __all__ = ["TIP", "TROCAR", "base_pose", "urdf_of"]
 
-Array = NDArray[np.float64]
 
 TROCAR = "trocar"
 """Frame of the URDF beside those of the links and the tip."""

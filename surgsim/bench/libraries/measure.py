@@ -10,17 +10,10 @@ import mujoco
 import numpy as np
 
 from surgsim import __version__
+from surgsim.array import Array
 from surgsim.bench.cases import KINEMATIC, kinematic
 from surgsim.bench.chunks import CHUNK, in_turn
-from surgsim.bench.libraries.problem import (
-    MOST_APART_M,
-    Array,
-    Circle,
-    Library,
-    apart,
-    circle_problem,
-    errors_of,
-)
+from surgsim.bench.libraries.problem import MOST_APART_M, Circle, Library, apart, circle_problem, errors_of
 from surgsim.errors import told
 from surgsim.simulate.loop import Simulation
 from surgsim.simulate.setup import prepare

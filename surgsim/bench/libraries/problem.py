@@ -5,15 +5,13 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from surgsim.array import Array
 from surgsim.bench.cases import kinematic
 from surgsim.control.rcm import rcm_kinematics
 from surgsim.models.arm import ArmModel
 from surgsim.simulate.loop import Simulation
 from surgsim.simulate.setup import prepare
-
-Array = NDArray[np.float64]
 
 MOST_APART_M = 1e-9
 """How far a library's forward kinematics may be from the model's."""

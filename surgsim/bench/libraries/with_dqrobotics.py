@@ -6,8 +6,9 @@ import numpy as np
 from dqrobotics import DQ, k_, normalize, rotation, translation, vec4
 from dqrobotics.robots import KukaLw4Robot
 
+from surgsim.array import Array
 from surgsim.bench.libraries.arm_files import base_pose
-from surgsim.bench.libraries.problem import Array, Circle
+from surgsim.bench.libraries.problem import Circle
 
 
 class DqRobotics:

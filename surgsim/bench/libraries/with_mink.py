@@ -6,7 +6,8 @@ import mink
 import mujoco
 import numpy as np
 
-from surgsim.bench.libraries.problem import Array, Circle
+from surgsim.array import Array
+from surgsim.bench.libraries.problem import Circle
 from surgsim.control.mink_tasks import RcmTask
 
 

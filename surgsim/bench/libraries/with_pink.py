@@ -7,8 +7,9 @@ import pinocchio
 from pink import Configuration, solve_ik
 from pink.tasks import FrameTask, Task
 
+from surgsim.array import Array
 from surgsim.bench.libraries.arm_files import TIP, urdf_of
-from surgsim.bench.libraries.problem import Array, Circle
+from surgsim.bench.libraries.problem import Circle
 
 
 class _Rcm(Task):  # type: ignore[misc]

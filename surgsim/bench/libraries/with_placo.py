@@ -7,8 +7,9 @@ from pathlib import Path
 import numpy as np
 import placo
 
+from surgsim.array import Array
 from surgsim.bench.libraries.arm_files import TIP, TROCAR, urdf_of
-from surgsim.bench.libraries.problem import Array, Circle
+from surgsim.bench.libraries.problem import Circle
 
 
 class Placo:

@@ -11,6 +11,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from surgsim.array import Array
 from surgsim.compiled import compiled
 from surgsim.control.external.calls import call_c, monotonic, sys_poll, sys_read, sys_write
 from surgsim.control.external.layout import REPLY
@@ -18,8 +19,6 @@ from surgsim.tick.arrays import Record, Seen
 from surgsim.tick.overlay import overlay
 from surgsim.tick.status import EXTERNAL, GOES_ON, INFEASIBLE
 from surgsim.tick.views import vector, words
-
-Array = NDArray[np.float64]
 
 FINE, SILENT, CLOSED, TOO_LONG, FOREIGN, LATE, STATUS, NOT_FINITE, INTERRUPTED, UNREAD = range(10)
 """Why there is no answer: the first word of a report."""

@@ -4,14 +4,11 @@ import json
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from surgsim.control.external.layout import HELLO, VERSION, hello, layout_hash, reply, request
 from surgsim.models.arm import ArmModel
 from surgsim.models.robot import joint_names
 from surgsim.models.texts import TIP, mjcf_of, urdf_of
-
-Array = NDArray[np.float64]
 
 
 def greeting(arm: ArmModel, gives: int) -> tuple[bytes, bytes]:

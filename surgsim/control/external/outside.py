@@ -5,6 +5,7 @@ from typing import Any, NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
+from surgsim.array import Array
 from surgsim.control.external import exchange
 from surgsim.control.external.command import Function, read_command
 from surgsim.control.external.declared import remember
@@ -18,7 +19,6 @@ from surgsim.models.arm import ArmModel
 from surgsim.tick.arrays import Seen, layout
 from surgsim.tick.overlay import laid_over
 
-Array = NDArray[np.float64]
 _POLLIN, _POLLOUT, _SHOWN = 1, 4, 16
 
 

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from typing import Any, Protocol, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from surgsim.array import Array
 from surgsim.catalog import Surroundings
 from surgsim.control.failure import ControlFailure, failure_of
 from surgsim.control.seen import new_seen
@@ -16,7 +16,6 @@ from surgsim.tick.arrays import Seen
 from surgsim.tick.fields import Fields
 from surgsim.tick.status import GOES_ON
 
-Array = NDArray[np.float64]
 Memory = TypeVar("Memory")
 InstrumentKernel = Callable[[Array, Seen, Array, Array], int]
 

@@ -10,9 +10,10 @@ before angular [rad]. They are the errors of the disturbance `calibration_error`
 than their number: an offset also turns a link, and base and instrument reach what the links do at the ends.
 """
 
+from surgsim.array import Array
 from surgsim.compiled import compiled
 from surgsim.tick.algebra import cross
-from surgsim.tick.arrays import Array, Model
+from surgsim.tick.arrays import Model
 from surgsim.tick.scratch import scratch, scratch_matrix
 from surgsim.tick.views import doubles, vector
 

@@ -4,9 +4,10 @@ from typing import Literal
 
 import numpy as np
 
+from surgsim.array import Array
 from surgsim.catalog import PartConfig
 from surgsim.compiled import compiled
-from surgsim.control.instrument_estimators.base import Array, KernelInstrumentEstimator
+from surgsim.control.instrument_estimators.base import KernelInstrumentEstimator
 from surgsim.models.arm import ArmModel
 from surgsim.tick.arrays import Seen
 from surgsim.tick.status import GOES_ON

@@ -4,9 +4,9 @@ import math
 from typing import Annotated, ClassVar, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field, NonNegativeFloat, PositiveFloat
 
+from surgsim.array import Array
 from surgsim.catalog import PartConfig
 from surgsim.compiled import compiled
 from surgsim.control.instrument_estimators.base import KernelInstrumentEstimator
@@ -22,7 +22,6 @@ from surgsim.tick.scratch import scratch, scratch_matrix
 from surgsim.tick.status import GOES_ON
 from surgsim.tick.views import doubles, vector
 
-Array = NDArray[np.float64]
 Length = Annotated[float, Field(ge=0.0, le=0.1)]
 Angle = Annotated[float, Field(ge=0.0, le=0.2)]
 TWIST = 6

@@ -8,8 +8,8 @@ import math
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
+from surgsim.array import Array
 from surgsim.compiled import compiled
 from surgsim.control.failure import ControlFailure
 from surgsim.control.inside import HEAD_SIZE
@@ -19,8 +19,6 @@ from surgsim.errors import Outcome, SurgsimError
 from surgsim.tick.fields import Fields
 from surgsim.tick.python_part import enter
 from surgsim.tick.status import GOES_ON
-
-Array = NDArray[np.float64]
 
 DECIMATION, ENTRIES, LIMIT = HEAD_SIZE, HEAD_SIZE + 1, HEAD_SIZE + 2
 """Gains after the head: ticks for which an action holds, its k entries, and the bound of each (k,)."""

@@ -2,10 +2,8 @@
 
 from collections.abc import Mapping
 
-import numpy as np
-from numpy.typing import NDArray
+from surgsim.array import Array
 
-Array = NDArray[np.float64]
 Observation = Mapping[str, Array]
 
 

@@ -5,14 +5,14 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
 
-import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from surgsim.array import Array
 from surgsim.errors import SurgsimError, told, unknown_name
 from surgsim.plugins import offers
 
 GROUP = "surgsim.policies"
-Policy = Callable[[Mapping[str, NDArray[np.float64]]], ArrayLike]
+Policy = Callable[[Mapping[str, Array]], ArrayLike]
 """An observation, see `observe`, to an action. A `reset` method, if it has one, is called before a run."""
 
 _SHIPPED = {

@@ -1,6 +1,7 @@
 """Shipped policies: the simplest there are, as examples and as a baseline."""
 
-from surgsim.control.policies.observation import Array, Observation
+from surgsim.array import Array
+from surgsim.control.policies.observation import Observation
 
 TIP_GAIN_PER_S = 5.0
 DAMPING_NM_S_PER_RAD = 5.0

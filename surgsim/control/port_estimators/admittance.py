@@ -3,9 +3,9 @@
 from typing import Annotated, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field, NonNegativeFloat, PositiveFloat
 
+from surgsim.array import Array
 from surgsim.catalog import PartConfig, Surroundings
 from surgsim.compiled import compiled
 from surgsim.control.admittance import give_way, heed
@@ -18,7 +18,6 @@ from surgsim.tick.arrays import Seen
 from surgsim.tick.scratch import scratch
 from surgsim.tick.status import GOES_ON, RANK_LOST
 
-Array = NDArray[np.float64]
 MASS, DAMPING, STIFFNESS, DEAD_ZONE, TARE_S, MOST, SENSOR, OTHER, OBSERVER, STATE = range(10)
 """Places of the gains."""
 

@@ -4,9 +4,9 @@ import math
 from typing import Annotated, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field, NonNegativeFloat, PositiveFloat
 
+from surgsim.array import Array
 from surgsim.catalog import PartConfig, Surroundings
 from surgsim.compiled import compiled
 from surgsim.control.filters import filter_gains
@@ -19,7 +19,6 @@ from surgsim.tick.arrays import Seen
 from surgsim.tick.scratch import scratch
 from surgsim.tick.status import GOES_ON, RANK_LOST
 
-Array = NDArray[np.float64]
 _ADVANCE = 0.25 * math.pi
 
 COMPLIANCE, OBSERVER, TARE_S, THRESHOLD, OMEGA, HARMONICS, LEARNING, MOST, STATE = range(9)

@@ -4,17 +4,15 @@ import math
 from typing import Annotated, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
+from surgsim.array import Array
 from surgsim.catalog import PartConfig
 from surgsim.compiled import compiled
 from surgsim.control.port_estimators.base import KernelPortEstimator
 from surgsim.models.arm import ArmModel
 from surgsim.tick.arrays import Seen
 from surgsim.tick.status import GOES_ON
-
-Array = NDArray[np.float64]
 
 
 class TrackingConfig(PartConfig):

@@ -5,8 +5,8 @@ from dataclasses import dataclass, field
 from typing import Any, Protocol, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from surgsim.array import Array
 from surgsim.catalog import Surroundings
 from surgsim.columns import Block
 from surgsim.control.failure import ControlFailure, Words, failure_of
@@ -20,7 +20,6 @@ from surgsim.tick.arrays import Resolved, Seen, new
 from surgsim.tick.python_part import first_raised
 from surgsim.tick.status import GOES_ON
 
-Array = NDArray[np.float64]
 Memory = TypeVar("Memory")
 ResolverKernel = Callable[[Array, Seen, Array, Resolved], int]
 

@@ -2,9 +2,7 @@
 
 from typing import Literal
 
-import numpy as np
-from numpy.typing import NDArray
-
+from surgsim.array import Array
 from surgsim.compiled import compiled
 from surgsim.control.external.config import ExternalPartConfig
 from surgsim.control.external.exchange import exchange
@@ -16,8 +14,6 @@ from surgsim.tick.algebra import times
 from surgsim.tick.arrays import Resolved, Seen
 from surgsim.tick.scratch import scratch, scratch_matrix
 from surgsim.tick.status import EXTERNAL, GOES_ON
-
-Array = NDArray[np.float64]
 
 
 class ExternalConfig(ExternalPartConfig):

@@ -3,9 +3,9 @@
 from typing import Annotated, Any, Literal, Union
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field, NonNegativeFloat, PositiveFloat
 
+from surgsim.array import Array
 from surgsim.catalog import PartConfig, Surroundings
 from surgsim.columns import vector, width
 from surgsim.compiled import compiled
@@ -24,7 +24,6 @@ from surgsim.tick.arrays import Resolved, Seen
 from surgsim.tick.scratch import scratch
 from surgsim.tick.status import GOES_ON
 
-Array = NDArray[np.float64]
 _OTHERS = tuple(RESOLVERS.usable(name) for name in RESOLVERS.names() if name not in ("policy", "hands_on"))
 AnyPlainResolver: Any = Annotated[Union[_OTHERS], Field(discriminator="type", title="resolver")]  # noqa: UP007
 MASS, DAMPING, STIFFNESS, DEAD_ZONE, HAND, LEAST_DEPTH, TARE_S, MOST, BARRIER, RANGE, COLUMN, WALLS = range(

@@ -4,9 +4,9 @@ from collections.abc import Callable, Mapping
 from typing import ClassVar, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import NonNegativeFloat, PositiveFloat
 
+from surgsim.array import Array
 from surgsim.catalog import PartConfig
 from surgsim.compiled import compiled
 from surgsim.control.inside import Head
@@ -23,8 +23,6 @@ from surgsim.tick.python_part import enter
 from surgsim.tick.scratch import scratch, scratch_matrix
 from surgsim.tick.status import GOES_ON, INFEASIBLE
 from surgsim.tick.views import doubles, vector
-
-Array = NDArray[np.float64]
 
 
 class MinkConfig(PartConfig):

@@ -5,9 +5,9 @@ from collections.abc import Mapping
 from typing import Annotated, ClassVar, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import AfterValidator, Field, NonNegativeFloat, PositiveFloat
 
+from surgsim.array import Array
 from surgsim.catalog import PartConfig
 from surgsim.columns import Block, scalar, vector
 from surgsim.compiled import compiled
@@ -30,8 +30,6 @@ from surgsim.tick.algebra import dot, norm, times
 from surgsim.tick.arrays import Resolved, Seen
 from surgsim.tick.scratch import scratch_matrix
 from surgsim.tick.status import GOES_ON, INFEASIBLE
-
-Array = NDArray[np.float64]
 
 WEIGHT, SLACK, ROLL_SLACK, K_TIP, K_RCM, SHARE, SPEED, LEAD, WALL_GAIN, KINETIC, WALLS = range(11)
 """Gains: w, w_s, w_r, k_tip, k_rcm, share of the budget or 0, v_max, lead, walls' gain, kinetic, walls."""

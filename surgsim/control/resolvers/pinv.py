@@ -3,9 +3,9 @@
 from typing import ClassVar, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import NonNegativeFloat
 
+from surgsim.array import Array
 from surgsim.catalog import PartConfig
 from surgsim.compiled import compiled
 from surgsim.control.resolvers.base import KernelResolver
@@ -15,8 +15,6 @@ from surgsim.tick.algebra import nearest
 from surgsim.tick.arrays import Resolved, Seen
 from surgsim.tick.scratch import scratch, scratch_matrix
 from surgsim.tick.status import GOES_ON, RANK_LOST
-
-Array = NDArray[np.float64]
 
 
 class PinvConfig(PartConfig):

@@ -4,9 +4,9 @@ import math
 from typing import Annotated, Any, Literal, Union
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field, PositiveFloat
 
+from surgsim.array import Array
 from surgsim.catalog import PartConfig, Surroundings
 from surgsim.compiled import compiled
 from surgsim.control.inside import resolve_below
@@ -24,7 +24,6 @@ from surgsim.tick.arrays import Resolved, Seen
 from surgsim.tick.scratch import scratch, scratch_matrix
 from surgsim.tick.status import GOES_ON
 
-Array = NDArray[np.float64]
 _OTHERS = tuple(RESOLVERS.usable(name) for name in RESOLVERS.names() if name != "policy")
 AnyOtherResolver: Any = Annotated[Union[_OTHERS], Field(discriminator="type", title="resolver")]  # noqa: UP007
 _TIP_REF = ACTION + 3

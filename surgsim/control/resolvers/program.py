@@ -3,8 +3,8 @@
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
+from surgsim.array import Array
 from surgsim.compiled import compiled
 from surgsim.control.qp import SHIPPED, DenseQp
 from surgsim.errors import unknown_name
@@ -12,7 +12,6 @@ from surgsim.packages import PACKAGES, installed, lacking
 from surgsim.tick.arrays import Resolved, Seen
 from surgsim.tick.quadratic_program import SOLVED, solve
 
-Array = NDArray[np.float64]
 Program = tuple[Array, Array, Array, Array, Array, Array, Array]
 """H, f, lower, upper, G, G_lower, G_upper, see `surgsim.tick.quadratic_program.solve`."""
 Solver = Callable[[Program], Array | None]

@@ -4,9 +4,9 @@ from collections.abc import Mapping
 from typing import Annotated, ClassVar, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import AfterValidator, NonNegativeFloat, PositiveFloat
 
+from surgsim.array import Array
 from surgsim.catalog import PartConfig
 from surgsim.compiled import compiled
 from surgsim.control.manipulability import fill_log_manipulability_gradient
@@ -27,8 +27,6 @@ from surgsim.models.arm import ArmModel
 from surgsim.tick.arrays import Resolved, Seen
 from surgsim.tick.scratch import scratch, scratch_matrix
 from surgsim.tick.status import GOES_ON, INFEASIBLE, RANK_LOST
-
-Array = NDArray[np.float64]
 
 WEIGHT, SLACK, CLIMB, SOFT, K_TIP, K_RCM, LIMITED, WALL_GAIN, WALLS = range(9)
 """Gains: w, w_s, w_mu, rows with a slack, k_tip, k_rcm, limited acceleration, walls' gain, first wall."""

@@ -4,9 +4,9 @@ import math
 from typing import Annotated, ClassVar, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field, NonNegativeFloat, PositiveFloat
 
+from surgsim.array import Array
 from surgsim.catalog import PartConfig
 from surgsim.compiled import compiled
 from surgsim.control.manipulability import fill_diamond
@@ -18,7 +18,6 @@ from surgsim.tick.arrays import Resolved, Seen
 from surgsim.tick.scratch import scratch, scratch_matrix
 from surgsim.tick.status import DIVERGED, GOES_ON, RANK_LOST
 
-Array = NDArray[np.float64]
 _DIVERGED = 1e12
 
 

@@ -2,14 +2,10 @@
 
 import math
 
-import numpy as np
-from numpy.typing import NDArray
-
+from surgsim.array import Array
 from surgsim.compiled import compiled
 from surgsim.control.bounds import fill_braking_bounds
 from surgsim.tick.arrays import Resolved, Seen
-
-Array = NDArray[np.float64]
 
 
 @compiled

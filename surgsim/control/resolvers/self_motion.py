@@ -5,9 +5,9 @@ from collections.abc import Mapping
 from typing import Annotated, ClassVar, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field, NonNegativeFloat
 
+from surgsim.array import Array
 from surgsim.catalog import PartConfig
 from surgsim.compiled import compiled
 from surgsim.control.manifold import (
@@ -32,8 +32,6 @@ from surgsim.tick.algebra import nearest
 from surgsim.tick.arrays import Resolved, Seen
 from surgsim.tick.scratch import scratch, scratch_matrix
 from surgsim.tick.status import GOES_ON, INFEASIBLE, RANK_LOST
-
-Array = NDArray[np.float64]
 
 K_TIP, K_RCM, SHARE, OFFSETS = range(4)
 """Gains: k_tip, k_rcm, share of the acceleration limits, and the search's first start (n,) of many."""

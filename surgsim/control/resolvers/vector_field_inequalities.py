@@ -4,9 +4,9 @@ from collections.abc import Mapping
 from typing import Annotated, ClassVar, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import AfterValidator, Field, NonNegativeFloat, PositiveFloat
 
+from surgsim.array import Array
 from surgsim.catalog import PartConfig
 from surgsim.columns import Block, scalar
 from surgsim.compiled import compiled
@@ -29,8 +29,6 @@ from surgsim.tick.algebra import cross, dot, norm
 from surgsim.tick.arrays import Resolved, Seen
 from surgsim.tick.scratch import scratch
 from surgsim.tick.status import GOES_ON, INFEASIBLE
-
-Array = NDArray[np.float64]
 
 RADIUS, ETA, ALPHA, DAMPING, GAIN, SAMPLED, WALL_GAIN, WALLS = range(8)
 """Places of the gains; the last is the number of walls, after which come the walls and the zones."""

@@ -1,8 +1,8 @@
 """The VPRNN's linear system of one instant, eq. (25), from the kernels of the resolver: to study it alone."""
 
 import numpy as np
-from numpy.typing import NDArray
 
+from surgsim.array import Array
 from surgsim.control.manipulability import diamond, jacobian_gradient
 from surgsim.control.problem import VelocityProblem
 from surgsim.control.resolvers.vprnn import (
@@ -20,8 +20,6 @@ from surgsim.control.resolvers.vprnn import (
 )
 from surgsim.control.seen import seen_of_velocity
 from surgsim.models.arm import ArmModel
-
-Array = NDArray[np.float64]
 
 
 class Network:

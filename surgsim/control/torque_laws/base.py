@@ -5,8 +5,8 @@ from dataclasses import dataclass, field
 from typing import Any, Protocol, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from surgsim.array import Array
 from surgsim.catalog import PartConfig, Surroundings
 from surgsim.control.failure import ControlFailure, Words, failure_of
 from surgsim.control.inside import Elsewhere, Inside
@@ -24,7 +24,6 @@ from surgsim.tick.fields import Fields
 from surgsim.tick.python_part import first_raised
 from surgsim.tick.status import GOES_ON
 
-Array = NDArray[np.float64]
 Memory = TypeVar("Memory")
 Config = TypeVar("Config", bound=PartConfig)
 TorqueKernel = Callable[[Array, Seen, Array, Array], int]

@@ -3,9 +3,9 @@
 from typing import Annotated, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
+from surgsim.array import Array
 from surgsim.compiled import compiled
 from surgsim.control.torque_laws.base import KernelTorqueLaw
 from surgsim.control.torque_laws.rcm_tasks import OWN_GAINS, RcmTasksConfig, wanted
@@ -24,7 +24,6 @@ from surgsim.tick.arrays import Seen
 from surgsim.tick.scratch import scratch, scratch_matrix
 from surgsim.tick.status import GOES_ON, RANK_LOST
 
-Array = NDArray[np.float64]
 Share = Annotated[float, Field(ge=0.0, le=1.0)]
 MOTION_SHARE, BIAS_SHARE = OWN_GAINS, OWN_GAINS + 1
 """Places of the gains that are this law's own."""

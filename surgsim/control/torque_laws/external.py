@@ -3,8 +3,8 @@
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from surgsim.array import Array
 from surgsim.compiled import compiled
 from surgsim.control.external.config import ExternalPartConfig
 from surgsim.control.external.exchange import POST_SIZE, exchange
@@ -15,7 +15,6 @@ from surgsim.tick.arrays import Seen
 from surgsim.tick.scratch import scratch
 from surgsim.tick.status import EXTERNAL, GOES_ON
 
-Array = NDArray[np.float64]
 _ADDS_BIAS = POST_SIZE
 
 

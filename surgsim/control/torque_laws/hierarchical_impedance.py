@@ -3,9 +3,9 @@
 from typing import Literal, Self
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import NonNegativeFloat
 
+from surgsim.array import Array
 from surgsim.catalog import PartConfig
 from surgsim.compiled import compiled
 from surgsim.control.torque_laws.base import KernelTorqueLaw, with_lists
@@ -24,7 +24,6 @@ from surgsim.tick.arrays import Seen
 from surgsim.tick.scratch import scratch, scratch_matrix
 from surgsim.tick.status import GOES_ON, RANK_LOST
 
-Array = NDArray[np.float64]
 TABLE_I_STIFFNESS = (80.0, 120.0, 60.0, 30.0, 20.0, 10.0, 10.0)
 """K_N2 of Table I of the VPRNN paper, from base to flange [N m/rad]."""
 TABLE_I_DAMPING = (6.0, 10.0, 5.0, 3.0, 2.0, 1.0, 1.0)

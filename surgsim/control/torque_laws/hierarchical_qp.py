@@ -3,9 +3,9 @@
 from typing import Annotated, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field, PositiveFloat
 
+from surgsim.array import Array
 from surgsim.catalog import Surroundings
 from surgsim.compiled import compiled
 from surgsim.control.acceleration import TORQUE_SHARE, fill_acceleration_bounds
@@ -24,8 +24,6 @@ from surgsim.tick.arrays import Seen
 from surgsim.tick.nominal import copy_model
 from surgsim.tick.scratch import scratch, scratch_matrix
 from surgsim.tick.status import GOES_ON, INFEASIBLE, RANK_LOST
-
-Array = NDArray[np.float64]
 
 KIND, RATE, RADIUS, POLES, WEIGHTS, FORESEEN = (HIERARCHY_GAINS + k for k in (0, 1, 2, 3, 5, 8))
 """Places of the gains that are this law's own: which observer, fastest torque, sphere, p1 and p2, weights of

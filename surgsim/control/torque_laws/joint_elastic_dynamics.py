@@ -3,9 +3,9 @@
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import PositiveFloat
 
+from surgsim.array import Array
 from surgsim.compiled import compiled
 from surgsim.control.elastic_observer import DELAY, ElasticObserverConfig, look_ahead, send
 from surgsim.control.torque_laws.base import KernelTorqueLaw
@@ -15,7 +15,6 @@ from surgsim.tick.arrays import Seen
 from surgsim.tick.scratch import scratch
 from surgsim.tick.status import GOES_ON
 
-Array = NDArray[np.float64]
 STIFFNESS, DAMPING = range(2)
 """Places of the gains; then the observer's numbers."""
 _GAINS = 2

@@ -3,9 +3,9 @@
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import PositiveFloat
 
+from surgsim.array import Array
 from surgsim.catalog import PartConfig
 from surgsim.compiled import compiled
 from surgsim.control.torque_laws.base import KernelTorqueLaw, for_joints
@@ -14,7 +14,6 @@ from surgsim.models.config import PerJoint
 from surgsim.tick.arrays import Seen
 from surgsim.tick.status import GOES_ON
 
-Array = NDArray[np.float64]
 STIFFNESS = (2000.0, 2000.0, 2000.0, 2000.0, 1000.0, 500.0, 200.0)
 """From base to flange [N m/rad]; torque-controlled arms offer up to 5000."""
 DAMPING = (60.0, 60.0, 40.0, 40.0, 15.0, 10.0, 6.0)

@@ -3,8 +3,8 @@
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from surgsim.array import Array
 from surgsim.compiled import compiled
 from surgsim.control.torque_laws.base import KernelTorqueLaw
 from surgsim.control.torque_laws.rcm_tasks import RcmTasksConfig, wanted
@@ -13,8 +13,6 @@ from surgsim.tick.algebra import nearest, times
 from surgsim.tick.arrays import Seen
 from surgsim.tick.scratch import scratch, scratch_matrix
 from surgsim.tick.status import GOES_ON, RANK_LOST
-
-Array = NDArray[np.float64]
 
 
 class NullSpaceBasisConfig(RcmTasksConfig):

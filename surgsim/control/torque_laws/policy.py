@@ -3,9 +3,9 @@
 from typing import Annotated, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
+from surgsim.array import Array
 from surgsim.catalog import PartConfig
 from surgsim.compiled import compiled
 from surgsim.control.policies.asking import ACTION, Asker, ask, asking_gains
@@ -14,8 +14,6 @@ from surgsim.control.torque_laws.base import KernelTorqueLaw
 from surgsim.models.arm import ArmModel
 from surgsim.tick.arrays import Seen
 from surgsim.tick.status import GOES_ON
-
-Array = NDArray[np.float64]
 
 
 class PolicyLawConfig(PartConfig):

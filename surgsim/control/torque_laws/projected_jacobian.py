@@ -3,8 +3,8 @@
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from surgsim.array import Array
 from surgsim.compiled import compiled
 from surgsim.control.torque_laws.base import KernelTorqueLaw
 from surgsim.control.torque_laws.hierarchical_impedance import project_torque
@@ -23,7 +23,6 @@ from surgsim.tick.arrays import Seen
 from surgsim.tick.scratch import scratch, scratch_matrix
 from surgsim.tick.status import GOES_ON, RANK_LOST
 
-Array = NDArray[np.float64]
 DYNAMIC = OWN_GAINS
 """Place of the gain that is this law's own: whether projectors are dynamically consistent."""
 RCM, TIP, JOINT, BIAS = range(4)

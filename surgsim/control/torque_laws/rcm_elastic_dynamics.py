@@ -3,9 +3,9 @@
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import NonNegativeFloat, PositiveFloat
 
+from surgsim.array import Array
 from surgsim.compiled import compiled
 from surgsim.control.elastic_observer import DELAY, ElasticObserverConfig, look_ahead, send
 from surgsim.control.torque_laws.base import KernelTorqueLaw
@@ -20,8 +20,6 @@ from surgsim.models.arm import ArmModel
 from surgsim.tick.arrays import Seen
 from surgsim.tick.scratch import scratch
 from surgsim.tick.status import GOES_ON, INFEASIBLE
-
-Array = NDArray[np.float64]
 
 
 class RcmElasticDynamicsConfig(ElasticObserverConfig):

@@ -2,9 +2,7 @@
 
 import math
 
-import numpy as np
-from numpy.typing import NDArray
-
+from surgsim.array import Array
 from surgsim.compiled import compiled
 from surgsim.control.acceleration import TORQUE_SHARE, allows, fill_acceleration_bounds, prioritised
 from surgsim.control.manipulability import fill_velocity_products
@@ -23,7 +21,6 @@ from surgsim.tick.arrays import Model, Seen
 from surgsim.tick.scratch import scratch, scratch_matrix
 from surgsim.tick.status import GOES_ON, RANK_LOST
 
-Array = NDArray[np.float64]
 K_RCM, D_RCM, K_TIP, D_TIP, K_JOINT, D_JOINT, SENSOR_DELAY, YIELDS, VALVE, PRESS = range(10)
 """Places of the gains, with which those of a law begin. The first six go with the bandwidth squared, or with
 the bandwidth, in turn."""

@@ -3,9 +3,9 @@
 from typing import Annotated, Literal, Self
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field, NonNegativeFloat, PositiveFloat, model_validator
 
+from surgsim.array import Array
 from surgsim.compiled import compiled
 from surgsim.control.observer import (
     delay_size,
@@ -24,8 +24,6 @@ from surgsim.tick.arrays import Seen
 from surgsim.tick.nominal import copy_model, dynamics, kinematics
 from surgsim.tick.scratch import scratch, scratch_matrix
 from surgsim.tick.status import GOES_ON, INFEASIBLE, RANK_LOST
-
-Array = NDArray[np.float64]
 
 OBSERVER, MOST_DELAY, FULL_GAIN, MOTORS = range(HIERARCHY_GAINS, HIERARCHY_GAINS + 4)
 """Places of the gains that are this law's own; from MOTORS on the inertias of real drives' motors (n,)."""

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, NonNegativeFloat, PositiveFloat
 
+from surgsim.array import Array
 from surgsim.compiled import compiled
 from surgsim.control.acceleration import TORQUE_SHARE, top_speed
 from surgsim.control.elastic_observer import (
@@ -26,7 +27,6 @@ from surgsim.tick.quadratic_program import SOLVED, solve
 from surgsim.tick.scratch import scratch, scratch_matrix
 from surgsim.tick.status import GOES_ON, INFEASIBLE
 
-Array = NDArray[np.float64]
 Ids = NDArray[np.int64]
 
 BLOCKS, HORIZON, VELOCITY_TIME, W_RCM, W_JOINT, K_JOINT, D_JOINT = range(7)

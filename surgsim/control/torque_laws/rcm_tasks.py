@@ -1,16 +1,14 @@
 """What torque laws are asked for at a trocar: accelerations of RCM, tip and posture, and their gains."""
 
-import numpy as np
-from numpy.typing import NDArray
 from pydantic import NonNegativeFloat, PositiveFloat
 
+from surgsim.array import Array
 from surgsim.catalog import PartConfig
 from surgsim.compiled import compiled
 from surgsim.control.torque_laws.rcm_hierarchy import HIERARCHY_GAINS, fill_demand, hierarchy_gains
 from surgsim.tick.arrays import Seen
 from surgsim.tick.nominal import copy_model
 
-Array = NDArray[np.float64]
 OWN_GAINS = HIERARCHY_GAINS
 """Place of the first gain that is a law's own."""
 

@@ -7,6 +7,7 @@ from pathlib import Path
 import mujoco
 import numpy as np
 
+from surgsim.array import Array
 from surgsim.models.adopted.card import Card, card_of
 from surgsim.models.adopted.collisions import find_capsules, pairs_left_out, points_of, surfaces_of
 from surgsim.models.adopted.config import ArmFileConfig
@@ -15,7 +16,6 @@ from surgsim.models.adopted.form import add_text, draw, mechanics_of, write_caps
 from surgsim.models.adopted.problem import AdoptionError
 from surgsim.models.adopted.surface import Surface, coarser
 from surgsim.models.adopted.written import mesh_name
-from surgsim.spatial import Array
 
 _MOST_DRAWN, _FEWEST_DRAWN = 6000, 200
 """Triangles: of a link, and of each of its meshes."""

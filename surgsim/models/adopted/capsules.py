@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from surgsim.array import Array
 from surgsim.models.adopted.surface import thinned
-from surgsim.spatial import Array
 
 _NUMBERS = 2 * 3 + 1  # of a capsule in a model: its ends and its radius
 _DIRECTIONS = 96

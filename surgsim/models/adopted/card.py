@@ -7,6 +7,7 @@ from itertools import pairwise
 import mujoco
 import numpy as np
 
+from surgsim.array import Array
 from surgsim.models.adopted.capsules import Capsule
 from surgsim.models.adopted.collisions import BARE_RADIUS_M
 from surgsim.models.adopted.findings import Findings
@@ -14,7 +15,6 @@ from surgsim.models.adopted.form import flange_in_last_link
 from surgsim.models.adopted.links import Link
 from surgsim.models.adopted.problem import listed
 from surgsim.models.adopted.surface import Surface
-from surgsim.spatial import Array
 
 _ALIGNED = 1e-6
 _HELD = 5  # degrees of freedom: the tip, and the shaft through a port

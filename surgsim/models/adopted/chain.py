@@ -6,10 +6,11 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
+from surgsim.array import Array
 from surgsim.models.adopted.config import ArmFileConfig, FlangeConfig
 from surgsim.models.adopted.problem import AdoptionError, listed
 from surgsim.models.adopted.turns import axes_of
-from surgsim.spatial import Array, unit
+from surgsim.spatial import unit
 
 FEWEST, MOST = 6, 8
 """Joints of an arm."""

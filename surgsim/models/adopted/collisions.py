@@ -3,6 +3,7 @@
 import mujoco
 import numpy as np
 
+from surgsim.array import Array
 from surgsim.models.adopted.capsules import Capsule, capsules_around, capsules_in
 from surgsim.models.adopted.config import ArmFileConfig
 from surgsim.models.adopted.findings import Findings
@@ -12,7 +13,6 @@ from surgsim.models.adopted.problem import AdoptionError
 from surgsim.models.adopted.surface import Surface, hull, surface_of, thinned
 from surgsim.models.adopted.touching import never_touch
 from surgsim.models.adopted.turns import at_zero
-from surgsim.spatial import Array
 
 BARE_RADIUS_M = 0.05
 """Of the capsule of a link that has no shape."""

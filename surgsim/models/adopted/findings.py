@@ -6,13 +6,13 @@ from functools import cached_property
 import mujoco
 import numpy as np
 
+from surgsim.array import Array
 from surgsim.models.adopted.chain import Chain, find_chain
 from surgsim.models.adopted.config import ArmFileConfig
 from surgsim.models.adopted.file import ModelFile, read_file
 from surgsim.models.adopted.limits import Limits, find_limits
 from surgsim.models.adopted.links import Link, Links, rigid_links
 from surgsim.models.adopted.problem import AdoptionError
-from surgsim.spatial import Array
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

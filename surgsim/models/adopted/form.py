@@ -5,11 +5,11 @@ from pathlib import Path
 import mujoco
 import numpy as np
 
+from surgsim.array import Array
 from surgsim.models.adopted.capsules import Capsule
 from surgsim.models.adopted.findings import Findings
 from surgsim.models.adopted.surface import Surface
 from surgsim.models.adopted.turns import at_zero, quaternion_of
-from surgsim.spatial import Array
 
 _OPTIONAL = ("jerk_limit_rad_per_s3", "torque_rate_limit_nm_per_s")
 

@@ -5,11 +5,11 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
+from surgsim.array import Array
 from surgsim.models.adopted.chain import Chain
 from surgsim.models.adopted.config import ArmFileConfig
 from surgsim.models.adopted.file import ModelFile
 from surgsim.models.adopted.problem import AdoptionError, listed
-from surgsim.spatial import Array
 
 ASSUMED_VELOCITY_RAD_PER_S = 3.14159
 ASSUMED_ACCELERATION_RAD_PER_S2 = 5.23599

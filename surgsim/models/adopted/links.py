@@ -6,9 +6,9 @@ from dataclasses import dataclass, field
 import mujoco
 import numpy as np
 
+from surgsim.array import Array
 from surgsim.models.adopted.chain import Chain
 from surgsim.models.adopted.turns import at_zero, axes_of
-from surgsim.spatial import Array
 
 _WORLD = 0
 _ROUNDING = 1e-9

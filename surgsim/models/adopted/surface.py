@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from surgsim.spatial import Array
+from surgsim.array import Array
 
 SPACING_M = 0.01
 """Greatest distance of the points that stand for a surface."""

@@ -12,13 +12,13 @@ from pathlib import Path
 import mujoco
 import numpy as np
 
+from surgsim.array import Array
 from surgsim.models.adopted.file import read_file
 from surgsim.models.adopted.form import draw, set_inertia
 from surgsim.models.adopted.links import inertia_together, principal
 from surgsim.models.adopted.problem import AdoptionError, listed
 from surgsim.models.adopted.surface import Surface, coarser, surface_of
 from surgsim.models.adopted.turns import at_zero, quaternion_of
-from surgsim.spatial import Array
 
 SHAFT_END = "shaft_end"
 """Site at the end of the shaft of an instrument whose tip is not there."""

@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING
 import mujoco
 import numpy as np
 
+from surgsim.array import Array
 from surgsim.models.adopted.capsules import Capsule
 from surgsim.models.adopted.surface import SPACING_M
-from surgsim.spatial import Array, segment_distance_squared
+from surgsim.spatial import segment_distance_squared
 
 if TYPE_CHECKING:
     from scipy.spatial import cKDTree

@@ -3,7 +3,7 @@
 import mujoco
 import numpy as np
 
-from surgsim.spatial import Array
+from surgsim.array import Array
 
 
 def axes_of(quaternion: Array) -> Array:

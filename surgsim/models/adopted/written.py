@@ -8,8 +8,8 @@ from collections.abc import Iterable, Sequence
 import mujoco
 import numpy as np
 
+from surgsim.array import Array
 from surgsim.models.adopted.surface import Surface
-from surgsim.spatial import Array
 
 MESHES = "meshes"
 

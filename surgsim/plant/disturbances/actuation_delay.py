@@ -5,9 +5,9 @@ from typing import Annotated, Any, Literal
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
+from surgsim.array import Array
 from surgsim.catalog import Surroundings
 from surgsim.compiled import compiled
 from surgsim.models.build import Scene
@@ -15,9 +15,6 @@ from surgsim.plant.disturbances.base import DELAYED, Disturbance, DisturbanceCon
 from surgsim.plant.part import BLOCK_TICKS
 from surgsim.tick.arrays import World
 from surgsim.tick.status import GOES_ON
-
-Array = NDArray[np.float64]
-
 
 DELAY, ROOM = 0, 1
 """Gains: d in ticks, and how many commands can be on the line."""

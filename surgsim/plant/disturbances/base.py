@@ -6,16 +6,13 @@ from abc import ABC, abstractmethod
 from typing import Annotated, ClassVar, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
+from surgsim.array import Array
 from surgsim.catalog import PartConfig
 from surgsim.compiled import compiled
 from surgsim.plant.part import BLOCK_TICKS, PlantPart
 from surgsim.spatial import unit
-
-Array = NDArray[np.float64]
-
 
 Spread = Annotated[float, Field(ge=0.0, le=1.0)]
 """Half-width of a uniform relative spread: a value x is drawn from x (1 - spread) to x (1 + spread)."""

@@ -4,7 +4,6 @@ from typing import Annotated, Literal, Self
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from surgsim.errors import SurgsimError
@@ -16,7 +15,6 @@ from surgsim.plant.disturbances.base import Disturbance, DisturbanceConfig
 from surgsim.plant.disturbances.settling import settle_cannula
 from surgsim.plant.shaft import bend_joints, lateral_masses, piece_lengths
 
-Array = NDArray[np.float64]
 Diameter = Annotated[float, Field(gt=0.0, le=0.02)]
 _SAG_TURNS, _SAG_RAD = 30, 1e-12
 _STABLE = 3.0

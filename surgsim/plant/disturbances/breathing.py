@@ -4,9 +4,9 @@ from typing import Annotated, Literal
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field, PositiveFloat, model_validator
 
+from surgsim.array import Array
 from surgsim.compiled import compiled
 from surgsim.errors import SurgsimError
 from surgsim.models.config import Vec3
@@ -14,9 +14,6 @@ from surgsim.plant.disturbances.base import Disturbance, DisturbanceConfig, Spre
 from surgsim.spatial import unit
 from surgsim.tick.arrays import World
 from surgsim.tick.status import GOES_ON
-
-Array = NDArray[np.float64]
-
 
 EXCURSION, PHASE, RATE, INSPIRATION, RAMP = 0, 3, 4, 5, 6
 """Gains: excursion A d (3,) [m], phase at the start, breaths [Hz], share of inspiration, ramp [s]."""

@@ -5,9 +5,9 @@ from typing import Annotated, Literal
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
+from surgsim.array import Array
 from surgsim.models.build import Scene
 from surgsim.models.displace import about, displace, rotation, with_quaternions
 from surgsim.models.robot import joint_names, link_names
@@ -15,7 +15,6 @@ from surgsim.plant.disturbances.base import Disturbance, DisturbanceConfig, copi
 from surgsim.plant.disturbances.settling import settle_cannula
 from surgsim.spatial import unit
 
-Array = NDArray[np.float64]
 LengthStd = Annotated[float, Field(ge=0.0, le=0.05)]
 AngleStd = Annotated[float, Field(ge=0.0, le=0.1)]
 

@@ -5,9 +5,9 @@ from typing import Any, ClassVar, Literal
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import NonNegativeFloat
 
+from surgsim.array import Array
 from surgsim.columns import vector
 from surgsim.compiled import compiled
 from surgsim.models.build import Scene, body_at_flange
@@ -21,7 +21,6 @@ from surgsim.tick.scratch import scratch
 from surgsim.tick.status import GOES_ON
 from surgsim.tick.views import doubles, site_place, site_turn
 
-Array = NDArray[np.float64]
 FORCE_STD, MOMENT_STD, BODY, ROOT = range(4)
 """Gains: standard deviations [N] and [N m], bodies of the instrument and of the arm's root; then the bias."""
 BIAS, WEIGHT, CENTRE, TIP = (slice(4 + 6 * k, 10 + 6 * k) for k in range(4))

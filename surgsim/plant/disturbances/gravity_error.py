@@ -5,13 +5,11 @@ from typing import Annotated, Literal
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field, FiniteFloat
 
+from surgsim.array import Array
 from surgsim.plant.disturbances.base import Direction, Disturbance, DisturbanceConfig, Spread, spread_factor
 from surgsim.spatial import cross
-
-Array = NDArray[np.float64]
 
 
 class GravityErrorConfig(DisturbanceConfig):

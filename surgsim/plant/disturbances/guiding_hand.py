@@ -5,9 +5,9 @@ from typing import Annotated, Any, Literal
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field, NonNegativeFloat, PositiveFloat
 
+from surgsim.array import Array
 from surgsim.compiled import compiled
 from surgsim.models.build import Scene
 from surgsim.models.config import Vec3
@@ -21,7 +21,6 @@ from surgsim.tick.scratch import scratch
 from surgsim.tick.status import GOES_ON
 from surgsim.tick.views import push_at, site_place
 
-Array = NDArray[np.float64]
 GRIP_S = 0.5
 """Time over which the grip closes and opens [s]."""
 

@@ -6,9 +6,9 @@ from typing import Annotated, Any, Literal
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field, NonNegativeFloat, PositiveFloat
 
+from surgsim.array import Array
 from surgsim.catalog import Surroundings
 from surgsim.compiled import compiled
 from surgsim.models.build import Scene
@@ -29,7 +29,6 @@ from surgsim.tick.scratch import scratch, scratch_matrix
 from surgsim.tick.status import GOES_ON
 from surgsim.tick.views import site_place, site_turn
 
-Array = NDArray[np.float64]
 POSITION_STD, ANGLE_STD, MARKERS, RATE, DELAY, LOST, DROPOUT, FIELD, FIELD_ANGLE, STRAIGHT = range(10)
 """Gains: s_p [m], s_a [rad], L [m], rate [Hz], delay [ticks], when it is lost [s], the probability of a
 missed frame, amplitudes of the field [m] and [rad]; the straight instrument's tip in the frame of the shaft's

@@ -4,15 +4,13 @@ from typing import Annotated, Literal
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field, NonNegativeFloat, model_validator
 
+from surgsim.array import Array
 from surgsim.catalog import Surroundings
 from surgsim.models.build import Scene, span
 from surgsim.models.robot import joint_names
 from surgsim.plant.disturbances.base import Disturbance, DisturbanceConfig, Spread, copied, spread_factor
-
-Array = NDArray[np.float64]
 
 
 class JointFrictionConfig(DisturbanceConfig):

@@ -4,13 +4,11 @@ from typing import Annotated, Literal
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
+from surgsim.array import Array
 from surgsim.models.build import Scene
 from surgsim.plant.disturbances.base import Disturbance, DisturbanceConfig
-
-Array = NDArray[np.float64]
 
 
 class LateTicksConfig(DisturbanceConfig):

@@ -5,9 +5,9 @@ from collections.abc import Mapping
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field, NonNegativeFloat, PositiveFloat
 
+from surgsim.array import Array
 from surgsim.compiled import compiled
 from surgsim.models.build import Scene
 from surgsim.models.config import Vec3
@@ -18,9 +18,6 @@ from surgsim.tick.arrays import World
 from surgsim.tick.scratch import scratch
 from surgsim.tick.status import GOES_ON
 from surgsim.tick.views import body_place, push_at, site_place, site_turn
-
-Array = NDArray[np.float64]
-
 
 FORCE, START, LENGTH, RISE, BODY, SITE, DISTANCE = 0, 3, 4, 5, 6, 7, 8
 """Gains: force (3,) [N], its times [s], the body pushed, the site on whose axis or -1, from it back [m]."""

@@ -4,9 +4,9 @@ from collections.abc import Mapping
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
+from surgsim.array import Array
 from surgsim.catalog import Surroundings
 from surgsim.compiled import compiled
 from surgsim.models.build import Scene
@@ -14,7 +14,6 @@ from surgsim.plant.disturbances.base import LATE, Disturbance, DisturbanceConfig
 from surgsim.tick.arrays import World
 from surgsim.tick.status import GOES_ON
 
-Array = NDArray[np.float64]
 _OTHERS = 29
 """Numbers of a row beside those of the joints: port, forces on tip and flange, the tracker's last sample."""
 

@@ -6,9 +6,9 @@ from typing import Annotated, Any, Literal
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field, NonNegativeFloat, PositiveFloat
 
+from surgsim.array import Array
 from surgsim.catalog import Surroundings
 from surgsim.compiled import compiled
 from surgsim.models.build import Scene
@@ -24,7 +24,6 @@ from surgsim.plant.part import BLOCK_TICKS
 from surgsim.tick.arrays import World
 from surgsim.tick.status import GOES_ON
 
-Array = NDArray[np.float64]
 Q_STD, V_STD, TAU_STD, PORT_STD, TIP_STD, RESOLUTION, KEEP, RATE = range(8)
 """Gains: s_q, s_v, s_t, s_p, s_f; r (0: no steps); a (-1: no differences); tracker (0: always) [Hz]."""
 FRAME, PORT, NOISE = 0, 1, 4

@@ -3,11 +3,11 @@
 import mujoco
 import numpy as np
 
+from surgsim.array import Array
 from surgsim.models.build import Scene
 from surgsim.plant.bore import FUNNEL_LENGTH_M, FUNNEL_SLOPE
 from surgsim.plant.records import world_of
 from surgsim.plant.shaft import bend_joints, shaft_line
-from surgsim.spatial import Array
 
 _TURNS = 8
 """In so many the direction of the force settles: the cannula moves far less than the shaft is long."""

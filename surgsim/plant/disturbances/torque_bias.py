@@ -4,9 +4,9 @@ from collections.abc import Mapping
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import NonNegativeFloat
 
+from surgsim.array import Array
 from surgsim.compiled import compiled
 from surgsim.models.build import Scene
 from surgsim.plant.disturbances.base import (
@@ -19,8 +19,6 @@ from surgsim.plant.disturbances.base import (
 )
 from surgsim.tick.arrays import World
 from surgsim.tick.status import GOES_ON
-
-Array = NDArray[np.float64]
 
 
 @compiled

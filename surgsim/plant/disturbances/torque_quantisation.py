@@ -4,15 +4,13 @@ from collections.abc import Mapping
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
+from surgsim.array import Array
 from surgsim.compiled import compiled
 from surgsim.plant.disturbances.base import QUANTISED, Disturbance, DisturbanceConfig
 from surgsim.tick.arrays import World
 from surgsim.tick.status import GOES_ON
-
-Array = NDArray[np.float64]
 
 
 @compiled

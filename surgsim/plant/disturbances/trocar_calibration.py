@@ -5,8 +5,8 @@ from typing import Any, Literal
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
+from surgsim.array import Array
 from surgsim.compiled import compiled
 from surgsim.models.config import Vec3
 from surgsim.plant.disturbances.base import (
@@ -20,8 +20,6 @@ from surgsim.plant.disturbances.base import (
 from surgsim.plant.disturbances.breathing import refuse_without_port
 from surgsim.tick.arrays import World
 from surgsim.tick.status import GOES_ON
-
-Array = NDArray[np.float64]
 
 
 @compiled

@@ -5,9 +5,9 @@ from typing import Any, Literal
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import NonNegativeFloat, PositiveFloat, model_validator
 
+from surgsim.array import Array
 from surgsim.catalog import PartConfig
 from surgsim.compiled import compiled
 from surgsim.models.build import Scene
@@ -22,7 +22,6 @@ from surgsim.tick.scratch import scratch
 from surgsim.tick.status import GOES_ON
 from surgsim.tick.views import push_at, site_place
 
-Array = NDArray[np.float64]
 AHEAD_STEPS = 0.2
 """How far ahead the spring is read, in physics steps. The least that keeps a sampled spring from giving out
 energy at every speed, every phase of the step and every stiffness that `check_step` lets through."""

@@ -20,13 +20,14 @@ import math
 import mujoco
 import numpy as np
 
+from surgsim.array import Array
 from surgsim.compiled import compiled
 from surgsim.models.build import Scene
 from surgsim.models.peg_board import PegBoardLayout
 from surgsim.plant.props.base import TIP_CONTACT_BIT, TIP_GEOM
 from surgsim.plant.props.peg_scene import hold_name, ring_name
 from surgsim.tick.algebra import norm, transposed_times
-from surgsim.tick.arrays import Array, Record, World
+from surgsim.tick.arrays import Record, World
 from surgsim.tick.views import body_place, doubles, integers, octets, vector
 
 NOBODY = -1

@@ -7,6 +7,7 @@ import mujoco
 import numpy as np
 from pydantic import Field, NonNegativeFloat, PositiveFloat, model_validator
 
+from surgsim.array import Array
 from surgsim.columns import Block, scalar
 from surgsim.compiled import compiled
 from surgsim.models.build import Scene
@@ -28,7 +29,7 @@ from surgsim.plant.props.grasp import (
 from surgsim.plant.props.peg_scene import add_board, add_holds, add_rings
 from surgsim.plant.props.ring_state import ELSEWHERE, GRASPED, ON_TARGET, REST_S, add_rest, place_of
 from surgsim.tick.algebra import times
-from surgsim.tick.arrays import Array, Record, World
+from surgsim.tick.arrays import Record, World
 from surgsim.tick.overlay import laid_over, overlay, take
 from surgsim.tick.status import GOES_ON
 from surgsim.tick.views import body_place, vector

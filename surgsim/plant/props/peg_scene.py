@@ -10,12 +10,11 @@ import math
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
+from surgsim.array import Array
 from surgsim.models.peg_board import PegBoardLayout
 from surgsim.plant.props.base import TIP_CONTACT_BIT, contact_tip
 
-Array = NDArray[np.float64]
 RIM_BIT = 4
 """Rims touch rims and pegs."""
 FOOT_BIT = 8

@@ -3,13 +3,9 @@
 import math
 from enum import IntEnum
 
-import numpy as np
-from numpy.typing import NDArray
-
+from surgsim.array import Array
 from surgsim.compiled import compiled
 from surgsim.tick.algebra import dot
-
-Array = NDArray[np.float64]
 
 REST_M_PER_S = 0.005
 REST_RAD_PER_S = 0.5

@@ -4,8 +4,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from surgsim.array import Array
 from surgsim.compare.wording import number
 from surgsim.report.figures.scale import Scale
 from surgsim.report.figures.svg import WIDTH, Drawing, colour, fmt, shortened
@@ -28,7 +28,7 @@ class Group:
 
     name: str
     index: int
-    values: NDArray[np.float64]
+    values: Array
     runs: int
     failed: int
 

@@ -5,12 +5,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from surgsim.array import Array
 from surgsim.report.figures.scale import Scale
 from surgsim.report.figures.svg import WIDTH, Drawing, colour, cross, dash, fmt, margin, mark, polyline
 
-Array = NDArray[np.float64]
 _TOP, _BOTTOM = 22.0, 186.0
 
 

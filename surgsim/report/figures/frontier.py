@@ -6,10 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from surgsim.array import Array
 from surgsim.report.figures.scale import Scale
 from surgsim.report.figures.svg import WIDTH, Drawing, colour, cross, dash, fmt, margin, mark, polyline
 
-Array = NDArray[np.float64]
 _STRIP, _ROW, _PLOT = 24.0, 13.0, 150.0
 
 

@@ -6,12 +6,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from surgsim.array import Array
 from surgsim.compare.wording import number
 from surgsim.report.figures.scale import Scale
 from surgsim.report.figures.svg import WIDTH, Drawing, cross, fmt
 from surgsim.report.figures.ticks import tick_text
 
-Array = NDArray[np.float64]
 _LEFT, _TOP, _ROW = 46.0, 24.0, 34.0
 _LIGHTEST, _DARKEST = 0.05, 0.5
 

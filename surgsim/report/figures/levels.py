@@ -4,12 +4,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from surgsim.array import Array
 from surgsim.report.figures.scale import Scale
 from surgsim.report.figures.svg import WIDTH, Drawing, colour, cross, dash, fmt, margin, mark, polyline
 
-Array = NDArray[np.float64]
 _STRIP, _ROW, _PLOT = 28.0, 13.0, 140.0
 _SHIFT = 4.0
 

@@ -7,6 +7,7 @@ from typing import Literal
 
 import numpy as np
 
+from surgsim.array import Array
 from surgsim.metrics.accuracy import rms
 from surgsim.metrics.catalog import compute_metrics
 from surgsim.scenario.load import load_scenario
@@ -15,7 +16,6 @@ from surgsim.studies.measures import outcome
 from surgsim.studies.study import Paper, SimulatedCase
 from surgsim.studies.tables import Row
 from surgsim.teleop.judgement import PASSIVE_J, excess_j
-from surgsim.tick.arrays import Array
 from surgsim.trace.trace import Trace
 
 Grip = Literal["normal", "light"]

@@ -11,7 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from surgsim.studies.study import Array, Case, Measured, Paper, Printed
+from surgsim.array import Array
+from surgsim.studies.study import Case, Measured, Paper, Printed
 from surgsim.studies.tables import Row
 
 PATHS = ("circle", "sinusoid", "spiral")

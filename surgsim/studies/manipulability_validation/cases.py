@@ -7,6 +7,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from surgsim.array import Array
 from surgsim.metrics.accuracy import rms
 from surgsim.metrics.optimality import attainable_manipulability
 from surgsim.scenario.schema import Scenario
@@ -23,7 +24,7 @@ from surgsim.studies.manipulability_validation.calibrate import (
 )
 from surgsim.studies.measures import outcome
 from surgsim.studies.stepped import SteppedTask, acceleration_ratio, tip_errors
-from surgsim.studies.study import Array, Curves, Results, SimulatedCase
+from surgsim.studies.study import Curves, Results, SimulatedCase
 from surgsim.studies.tables import Row, number, numbers, pairs
 from surgsim.tasks.profile import Profile
 from surgsim.trace.trace import Trace

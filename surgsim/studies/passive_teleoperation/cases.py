@@ -7,6 +7,7 @@ from typing import ClassVar, Literal, get_args
 
 import numpy as np
 
+from surgsim.array import Array
 from surgsim.columns import scalar, width
 from surgsim.control.resolvers.base import KernelResolver
 from surgsim.control.resolvers.passive_qp import PassiveQpConfig
@@ -22,7 +23,7 @@ from surgsim.studies.passive_teleoperation.measures import (
 from surgsim.studies.study import Curves, Paper, Printed, SimulatedCase
 from surgsim.studies.tables import Cell, Row
 from surgsim.teleop.messages import PassivityMode
-from surgsim.tick.arrays import Array, Resolved, Seen
+from surgsim.tick.arrays import Resolved, Seen
 from surgsim.trace.trace import Trace
 
 Place = Literal["wall", "free"]

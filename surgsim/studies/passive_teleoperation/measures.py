@@ -6,11 +6,12 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
+from surgsim.array import Array
 from surgsim.metrics.accuracy import rms
 from surgsim.metrics.catalog import compute_metrics
 from surgsim.metrics.teleoperation import tip_velocity
 from surgsim.studies.measures import outcome
-from surgsim.studies.study import Array, Curves
+from surgsim.studies.study import Curves
 from surgsim.studies.tables import Row, groups, number, pick
 from surgsim.trace.trace import Trace
 

@@ -7,6 +7,7 @@ from functools import lru_cache
 import numpy as np
 from scipy.integrate import solve_ivp
 
+from surgsim.array import Array
 from surgsim.control.failure import ControlFailure
 from surgsim.control.manipulability import log_manipulability_gradient
 from surgsim.control.null_space import least_velocity
@@ -21,7 +22,7 @@ from surgsim.simulate.setup import prepare
 from surgsim.studies.figure import BLUE, PURPLE, VERMILLION, Axes, formula, label
 from surgsim.studies.measures import within_from_s
 from surgsim.studies.still import still_problem
-from surgsim.studies.study import Array, Case, Judged, Measured, Results, holds
+from surgsim.studies.study import Case, Judged, Measured, Results, holds
 from surgsim.studies.tables import Row, Tables, number, numbers, pick, span
 from surgsim.studies.vprnn.cases import METHODS, PAPER, sinusoid
 

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from surgsim.array import Array
 from surgsim.studies.figure import (
     BLACK,
     BLUE,
@@ -19,7 +20,7 @@ from surgsim.studies.figure import (
 )
 from surgsim.studies.stages import draw_stages
 from surgsim.studies.starts import draw_starts
-from surgsim.studies.study import Array, Figure, Measured, Results, Section
+from surgsim.studies.study import Figure, Measured, Results, Section
 from surgsim.studies.tables import Row, Tables, number, numbers, pick
 from surgsim.studies.vprnn.cases import (
     COMPARED,

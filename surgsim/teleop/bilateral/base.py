@@ -16,9 +16,10 @@ import numpy as np
 from numba import types
 from numba.core.dispatcher import Dispatcher
 
+from surgsim.array import Array
 from surgsim.errors import SurgsimError
 from surgsim.teleop.messages import CONTENT
-from surgsim.tick.arrays import A1, Array, Record, type_of
+from surgsim.tick.arrays import A1, Record, type_of
 from surgsim.tick.overlay import laid_over, overlay, take
 
 

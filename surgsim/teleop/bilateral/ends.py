@@ -2,11 +2,12 @@
 
 from typing import Any, ClassVar
 
+from surgsim.array import Array
 from surgsim.compiled import address_of, call_at, compiled
 from surgsim.teleop.bilateral.base import BilateralScheme, End, compiled_only, end_signature
 from surgsim.teleop.messages import MODES, SCHEME
 from surgsim.teleop.receiver import Receiver, ReceiverLaw, trust
-from surgsim.tick.arrays import Array, Record
+from surgsim.tick.arrays import Record
 from surgsim.tick.overlay import take
 
 

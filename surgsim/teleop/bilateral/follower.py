@@ -4,11 +4,12 @@ from typing import ClassVar
 
 from pydantic import NonNegativeFloat, PositiveFloat
 
+from surgsim.array import Array
 from surgsim.catalog import PartConfig
 from surgsim.compiled import compiled
 from surgsim.teleop.bilateral.base import End
 from surgsim.teleop.messages import FORCE, POSITION, VELOCITY
-from surgsim.tick.arrays import Array, Record
+from surgsim.tick.arrays import Record
 from surgsim.tick.status import GOES_ON
 
 

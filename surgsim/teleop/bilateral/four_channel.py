@@ -4,6 +4,7 @@ from typing import Literal
 
 from pydantic import NonNegativeFloat
 
+from surgsim.array import Array
 from surgsim.catalog import PartConfig
 from surgsim.compiled import compiled
 from surgsim.teleop.bilateral.base import BilateralScheme, End, numbers
@@ -17,7 +18,7 @@ from surgsim.teleop.bilateral.follower import (
     tell_motion,
 )
 from surgsim.teleop.messages import FORCE
-from surgsim.tick.arrays import Array, Record
+from surgsim.tick.arrays import Record
 from surgsim.tick.overlay import overlay
 from surgsim.tick.scratch import scratch
 from surgsim.tick.status import GOES_ON

@@ -4,6 +4,7 @@ from typing import ClassVar, Literal
 
 from pydantic import NonNegativeFloat, PositiveFloat
 
+from surgsim.array import Array
 from surgsim.catalog import PartConfig
 from surgsim.compiled import compiled
 from surgsim.teleop.bilateral.base import BilateralScheme, End, numbers
@@ -17,7 +18,7 @@ from surgsim.teleop.bilateral.follower import (
 )
 from surgsim.teleop.tank import affordable
 from surgsim.tick.algebra import dot
-from surgsim.tick.arrays import Array, Record
+from surgsim.tick.arrays import Record
 from surgsim.tick.overlay import overlay
 from surgsim.tick.scratch import scratch
 from surgsim.tick.status import GOES_ON

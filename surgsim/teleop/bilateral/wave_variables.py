@@ -5,13 +5,14 @@ from typing import ClassVar, Literal
 
 from pydantic import NonNegativeFloat, PositiveFloat
 
+from surgsim.array import Array
 from surgsim.catalog import PartConfig
 from surgsim.compiled import compiled
 from surgsim.teleop.bilateral.base import BilateralScheme, End, numbers
 from surgsim.teleop.bilateral.follower import Follower, FollowerConfig, FollowerLaw, drive
 from surgsim.teleop.messages import FORCE, POSITION, VELOCITY
 from surgsim.tick.algebra import dot
-from surgsim.tick.arrays import Array, Record
+from surgsim.tick.arrays import Record
 from surgsim.tick.overlay import overlay
 from surgsim.tick.scratch import scratch
 from surgsim.tick.status import GOES_ON

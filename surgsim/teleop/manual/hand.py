@@ -3,8 +3,8 @@
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from surgsim.array import Array
 from surgsim.teleop.console import ConsoleState
 from surgsim.teleop.hand import HandCommand
 from surgsim.teleop.impedance import Grip, hand_wrench
@@ -15,7 +15,6 @@ from surgsim.teleop.roll import turn_grip
 from surgsim.tick.arrays import new
 from surgsim.tick.overlay import take
 
-Array = NDArray[np.float64]
 EASE_S = 0.05
 LEAD_M = 0.05
 LEAD_RAD = 0.5
