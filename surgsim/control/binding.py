@@ -79,14 +79,16 @@ def new_control(
     corrects: bool,
     omega_gain: float,
     limit_zone_rad: float,
+    adds_avoidance: bool,
     at_reference: bool,
 ) -> Control:
     """The record of a controller's tick; `arm` must outlive it."""
     c = new(Control, arm.limits.q_min.size)
     c.has_law, c.at_reference, c.corrects = has_law, at_reference, corrects
-    c.command.budget_j, c.limit_zone = np.inf, limit_zone_rad
+    c.command.budget_j, c.adds_avoidance = np.inf, adds_avoidance
     for seen in (c.seen, c.referred):
         fill_constants(seen, arm, dt_s=dt_s, has_trocar=has_trocar, omega_gain=omega_gain)
+        seen.limit_zone = limit_zone_rad
     arm.point(c.measured)
     arm.point(c.reference)
     return c

@@ -56,8 +56,9 @@ class ControllerConfig(PartConfig):
         evaluate_at: Where the resolver's kinematics are evaluated: the `measured` joint positions, or the
             integrated `reference`, as a position-controlled arm would.
         position_gain_per_s: alpha of the bounds Omega: how fast a joint may approach its position limit.
-        limit_zone_rad: Within this of the end of a joint's range, null-space motion that leads away from it
-            is added to the resolver's answer, if the resolver shares its null space; 0: none is [rad].
+        limit_zone_rad: Within this of the end of a joint's range, null-space motion leads away from it: it is
+            added to the answer of a resolver that shares its null space, and part of the objective of one
+            that solves a program; 0: none [rad].
     """
 
     name: Name
@@ -145,7 +146,8 @@ class Controller:
             has_law=self.parts.law is not None,
             corrects=getattr(self.parts.instrument, "corrects", True),
             omega_gain=config.position_gain_per_s,
-            limit_zone_rad=config.limit_zone_rad if shares_null_space(config.resolver) else 0.0,
+            limit_zone_rad=config.limit_zone_rad,
+            adds_avoidance=shares_null_space(config.resolver),
             at_reference=config.evaluate_at == "reference",
         )
         self._bound = bind(self.parts, self.control, arm)

@@ -86,8 +86,8 @@ def decide(c: Control) -> int:
     status = call_at(minds.resolver, gains, asked, memory, c.resolved)
     if status != GOES_ON:
         return status
-    if c.limit_zone > 0.0:
-        keep_from_limits(c.limit_zone, asked, c.resolved)
+    if c.adds_avoidance:
+        keep_from_limits(asked, c.resolved)
     c.torque[:] = 0.0
     if c.has_law:
         c.who = LAW

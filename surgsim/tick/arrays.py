@@ -227,6 +227,7 @@ class Seen(Record):
         jaw: How far the jaws close, from 0 to 1.
         budget_j: Energy that may be given to the surroundings in this period [J]; infinite: no limit.
         omega_gain: alpha of Omega [1/s].
+        limit_zone: How near the end of a joint's range the null space leads away from it [rad]; 0: never.
         tracked_samples: Poses of the instrument that a tracker has measured so far; 0: there is none.
         tracked_age_s: How much older than q the last of them is [s].
         has_wrench: 1 with a force-torque sensor at the flange, else 0.
@@ -312,6 +313,7 @@ class Seen(Record):
     jaw: float
     budget_j: float
     omega_gain: float
+    limit_zone: float
     tracked_samples: int
     tracked_age_s: float
     has_wrench: int
@@ -487,7 +489,7 @@ class Control(Record):
         at_reference: Whether the resolver's kinematics are those of the joint reference.
         corrects: Whether the instrument estimator may correct the nominal model.
         who: Written: the part that a status other than GOES_ON came from.
-        limit_zone: From how near the ends of the joints' ranges the null space leads away [rad].
+        adds_avoidance: Whether null-space motion away from joint limits is added to the resolver's answer.
         q_ref: Joint reference at this tick (n,) [rad].
         torque: Sum of the law's terms (n,) [N m].
         correction: Twist of the corrected tip in the nominal tip's frame, rows linear [m] and angular [rad]
@@ -512,7 +514,7 @@ class Control(Record):
     at_reference: int
     corrects: int
     who: int
-    limit_zone: float
+    adds_avoidance: int
     q_ref: Array
     torque: Array
     correction: Array

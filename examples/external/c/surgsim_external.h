@@ -23,7 +23,7 @@
 #define SURGSIM_MOST_JOINTS 8
 #define SURGSIM_JOINT_VELOCITY 1
 #define SURGSIM_JOINT_TORQUE 2
-#define SURGSIM_HASH INT64_C(8764467204797176083)
+#define SURGSIM_HASH INT64_C(-1908477213626824159)
 #define SURGSIM_HELLO INT64_C(8028911418491753043)
 #define SURGSIM_DECLARATION INT64_C(30508584609993299)
 #define SURGSIM_REQUEST INT64_C(118143297475155)
@@ -66,6 +66,8 @@ typedef struct {
     double jaw; /* How far the jaws close, from 0 to 1 */
     double budget_j; /* Energy that may be given to the surroundings in this period; infinite: no limit [J] */
     double omega_gain; /* alpha of Omega [1/s] */
+    /* How near the end of a joint's range the null space leads away from it; 0: never [rad] */
+    double limit_zone;
     /* Poses of the instrument that a tracker has measured so far; 0: there is none */
     int64_t tracked_samples;
     double tracked_age_s; /* How much older than q the last of them is [s] */
@@ -126,7 +128,7 @@ typedef struct {
 #ifndef __cplusplus
 _Static_assert(sizeof(surgsim_hello) == 64, "no gaps");
 _Static_assert(sizeof(surgsim_declaration) == 160, "no gaps");
-_Static_assert(sizeof(surgsim_request) == 3160, "no gaps");
+_Static_assert(sizeof(surgsim_request) == 3168, "no gaps");
 _Static_assert(sizeof(surgsim_reply) == 88, "no gaps");
 #endif
 

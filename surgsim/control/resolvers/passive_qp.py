@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, Literal
 
 import numpy as np
 from pydantic import AfterValidator, Field, NonNegativeFloat, PositiveFloat
@@ -11,6 +11,7 @@ from surgsim.array import Array
 from surgsim.catalog import PartConfig
 from surgsim.columns import Block, scalar, vector
 from surgsim.compiled import compiled
+from surgsim.control.limit_avoidance import fill_avoidance
 from surgsim.control.planes import PlaneConfig, fill_plane_rows, plane_numbers
 from surgsim.control.qp import check_package
 from surgsim.control.resolvers.base import KernelResolver
@@ -28,7 +29,7 @@ from surgsim.control.tip_energy import affordable_speed, fill_tip_inertia
 from surgsim.models.arm import ArmModel
 from surgsim.tick.algebra import dot, norm, times
 from surgsim.tick.arrays import Resolved, Seen
-from surgsim.tick.scratch import scratch_matrix
+from surgsim.tick.scratch import scratch, scratch_matrix
 from surgsim.tick.status import GOES_ON, INFEASIBLE
 
 WEIGHT, SLACK, ROLL_SLACK, K_TIP, K_RCM, SHARE, SPEED, LEAD, WALL_GAIN, KINETIC, WALLS = range(11)
@@ -65,7 +66,6 @@ class PassiveQpConfig(PartConfig):
         solver: `active_set`, `daqp`, `osqp`, or another solver that qpsolvers finds installed, by its name.
     """
 
-    shares_null_space: ClassVar[bool] = True
     type: Literal["passive_qp"] = "passive_qp"
     velocity_weight: PositiveFloat = 1.0
     slack_weight: PositiveFloat = 1e6
@@ -202,6 +202,10 @@ def passive_program(gains: Array, seen: Seen, memory: Array, braking: bool) -> P
         fill_braking(seen, memory[:n], lower[:n], upper[:n])
     for j in range(size):
         H[j, j] = gains[WEIGHT] if j < n else 2.0 * gains[SLACK if j < size - 1 else ROLL_SLACK]
+    away = scratch(n)
+    if fill_avoidance(seen, True, away):
+        for j in range(n):
+            f[j] = -gains[WEIGHT] * away[j]
     share = _covered(gains, seen)
     for i in range(3):
         G[i, :n] = seen.Jv_WT[i]

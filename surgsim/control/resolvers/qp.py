@@ -1,7 +1,7 @@
 """QP: inverse kinematics as a convex program with the RCM as a hard constraint."""
 
 from collections.abc import Mapping
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, Literal
 
 import numpy as np
 from pydantic import AfterValidator, NonNegativeFloat, PositiveFloat
@@ -9,6 +9,7 @@ from pydantic import AfterValidator, NonNegativeFloat, PositiveFloat
 from surgsim.array import Array
 from surgsim.catalog import PartConfig
 from surgsim.compiled import compiled
+from surgsim.control.limit_avoidance import fill_avoidance
 from surgsim.control.manipulability import fill_log_manipulability_gradient
 from surgsim.control.planes import PlaneConfig, fill_plane_rows, plane_numbers
 from surgsim.control.qp import check_package
@@ -49,7 +50,6 @@ class QpConfig(PartConfig):
         solver: `active_set`, `daqp`, `osqp`, or another solver that qpsolvers finds installed, by its name.
     """
 
-    shares_null_space: ClassVar[bool] = True
     type: Literal["qp"] = "qp"
     velocity_weight: PositiveFloat = 1.0
     slack_weight: PositiveFloat = 1e6
@@ -165,6 +165,10 @@ def qp_program(gains: Array, seen: Seen, last: Array) -> tuple[bool, Program]:
         ranked = fill_log_manipulability_gradient(seen.Jv_WT, seen.z_W, f[:n])
         for j in range(n):
             f[j] *= -gains[CLIMB]
+    away = scratch(n)
+    if fill_avoidance(seen, False, away):
+        for j in range(n):
+            f[j] -= gains[WEIGHT] * away[j]
     G[:rows, :n] = J
     for i in range(soft):
         G[i, n + i] = -1.0

@@ -1,7 +1,7 @@
 """Vector-field inequalities: the shaft inside a sphere about the port, as a row of a quadratic program."""
 
 from collections.abc import Mapping
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, Literal
 
 import numpy as np
 from pydantic import AfterValidator, Field, NonNegativeFloat, PositiveFloat
@@ -11,6 +11,7 @@ from surgsim.catalog import PartConfig
 from surgsim.columns import Block, scalar
 from surgsim.compiled import compiled
 from surgsim.control.barriers import entry_curvature
+from surgsim.control.limit_avoidance import fill_avoidance
 from surgsim.control.planes import PlaneConfig, fill_plane_rows, plane_numbers
 from surgsim.control.qp import check_package
 from surgsim.control.resolvers.base import KernelResolver
@@ -53,7 +54,6 @@ class VectorFieldInequalitiesConfig(PartConfig):
         solver: `active_set`, `daqp`, `osqp`, or another solver that qpsolvers finds installed, by its name.
     """
 
-    shares_null_space: ClassVar[bool] = True
     type: Literal["vector_field_inequalities"] = "vector_field_inequalities"
     entry_radius_m: PositiveFloat = 0.0005
     eta_per_s: PositiveFloat = 2.0
@@ -121,6 +121,10 @@ def _fill_objective(gains: Array, seen: Seen, H: Array, f: Array) -> None:
                 s += alpha * seen.Jv_WT[i, j] * seen.Jv_WT[i, k]
                 s += (1.0 - alpha) * seen.Jw_WT[i, j] * seen.Jw_WT[i, k]
             H[j, k] = s
+    away = scratch(n)
+    if fill_avoidance(seen, True, away):
+        for j in range(n):
+            f[j] -= gains[DAMPING] * gains[DAMPING] * away[j]
 
 
 @compiled
