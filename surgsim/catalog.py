@@ -45,6 +45,11 @@ class Surroundings(Protocol):
         ...
 
     @property
+    def rolls_instrument(self) -> bool:
+        """Whether the task needs the instrument to be rolled."""
+        ...
+
+    @property
     def props(self) -> Sequence[object]:
         """Configs of the props."""
         ...

@@ -22,7 +22,7 @@ from surgsim.control.port_estimators import PORT_ESTIMATORS
 from surgsim.control.port_estimators.base import PortEstimatorConfig
 from surgsim.control.port_estimators.measured import MeasuredPortConfig
 from surgsim.control.problem import Resolution
-from surgsim.control.redundancy import check_redundancy, shares_null_space
+from surgsim.control.redundancy import check_redundancy, follows_roll, shares_null_space
 from surgsim.control.resolvers import RESOLVERS
 from surgsim.control.resolvers.base import ResolverConfig
 from surgsim.control.torque_laws import TORQUE_LAWS
@@ -72,7 +72,12 @@ class ControllerConfig(PartConfig):
     limit_zone_rad: NonNegativeFloat = 0.2
 
     def check(self, scenario: Surroundings) -> None:
-        """Refuse a scenario that one of the parts does not fit."""
+        """Refuse a scenario that one of the parts does not fit, or whose roll no part follows."""
+        if scenario.rolls_instrument and not follows_roll(self.resolver):
+            raise ValueError(
+                f"the task rolls the instrument, and resolver '{self.resolver.type}' leaves the roll free: "
+                "passive_qp and vector_field_inequalities follow it"
+            )
         for part in (self.resolver, self.torque_law, self.port, self.instrument):
             if part is not None:
                 part.check(scenario)

@@ -24,6 +24,11 @@ def shares_null_space(config: object) -> bool:
     return bool(getattr(config, "shares_null_space", False))
 
 
+def follows_roll(config: object) -> bool:
+    """Whether the resolver of `config` moves the roll about the shaft as commanded, `follows_roll` of it."""
+    return bool(getattr(config, "follows_roll", False))
+
+
 def check_redundancy(
     config: ResolverConfig | TorqueLawConfig | None, arm: ArmModel, has_trocar: bool
 ) -> None:

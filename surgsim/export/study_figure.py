@@ -5,6 +5,7 @@ numbers, as a delay is, and the others make few enough lines, the figure is line
 and a point for each row.
 """
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -68,31 +69,35 @@ def study_figure(study: StudySubject, table: str | None, columns: Sequence[str],
     Args:
         study: The study.
         table: Which of its tables; None: the main one.
-        columns: Columns of numbers; the first two that are no keys, if none is named.
+        columns: Columns of numbers; if none is named two that are no keys, those with a unit first.
         width: `column` or `page`.
 
     Raises:
-        SurgsimError: If there is no such table or column, or the table is too long.
+        SurgsimError: If there is no such table or column, or the table is too long, without numbers, or of
+            rows with units of their own.
     """
     name, rows = study.rows(table)
     drawn = _drawn(rows, columns)
-    if drawn is None:
-        others = [other for other in study.tables if _drawn(study.rows(other)[1], ()) is not None]
-        raise SurgsimError(
-            f"--figure: table '{name}' of {study.path} has {len(rows)} rows, more than a figure shows: "
-            f"{MOST_ROWS}, or {MOST_LINES} lines. --study-table names another: {', '.join(others)}"
-        )
+    if isinstance(drawn, str):
+        others = [other for other in study.tables if isinstance(_drawn(study.rows(other)[1], ()), Drawn)]
+        another = f". --study-table names another: {', '.join(others)}" if others else ""
+        raise SurgsimError(f"--figure: table '{name}' of {study.path} {drawn}{another}")
     return _over_a_key(drawn, width) if drawn.over else _points(drawn, width)
 
 
-def _drawn(rows: Sequence[Row], columns: Sequence[str]) -> Drawn | None:
-    """What is drawn of a table; None if it is too much.
+def _drawn(rows: Sequence[Row], columns: Sequence[str]) -> Drawn | str:
+    """What is drawn of a table, or why nothing can be.
 
     Raises:
         SurgsimError: If a column is none of numbers.
     """
     keys = keys_of(rows)
+    if len({_unit_in(str(row[keys[0]])) for row in rows}) > 1:
+        return "has rows of different units, which no axis holds"
     known = [name for name in rows[0] if name not in keys and _of_numbers(rows, name)]
+    known.sort(key=lambda name: "[" not in heading(name))
+    if not known:
+        return "has no column of numbers"
     for name in columns:
         if name not in known:
             raise SurgsimError(f"--metric: {unknown_name(name, 'column of numbers of this table', known)}")
@@ -100,10 +105,17 @@ def _drawn(rows: Sequence[Row], columns: Sequence[str]) -> Drawn | None:
     places = {key: len(groups(rows, key)) for key in keys if key not in _NAMES and _of_numbers(rows, key)}
     for over in sorted(places, key=lambda key: -places[key]):
         drawn = Drawn(rows=rows, keys=keys, over=over, shown=shown)
-        if places[over] >= FEWEST_PLACES and len(drawn.lines) <= MOST_LINES and shown:
+        if places[over] >= FEWEST_PLACES and len(drawn.lines) <= MOST_LINES:
             return drawn
-    fits = len(rows) <= MOST_ROWS and shown
-    return Drawn(rows=rows, keys=keys, over="", shown=shown) if fits else None
+    if len(rows) > MOST_ROWS:
+        return f"has {len(rows)} rows, more than a figure shows: {MOST_ROWS}, or {MOST_LINES} lines"
+    return Drawn(rows=rows, keys=keys, over="", shown=shown)
+
+
+def _unit_in(words: str) -> str:
+    """The unit in brackets at the end of a row's name: `mm` of `tip past a plane (mm)`."""
+    found = re.search(r"\(([^()]*)\)$", words)
+    return found[1] if found else ""
 
 
 def keys_of(rows: Sequence[Row]) -> tuple[str, ...]:

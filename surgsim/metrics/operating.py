@@ -27,7 +27,7 @@ def clutch_open_fraction(trace: Trace) -> float:
 
 
 def tremor_rms(velocity: Array, period_s: float) -> float:
-    """RMS of the motion in the band of tremor, from its velocity (rows, 3) [m]; NaN for less than a second.
+    """RMS of the motion in the band of tremor, from its velocity (rows, 3) [m/s]; NaN for less than a second.
 
     Each frequency of the velocity under a Hann window, over 2 pi f: a movement's own spectrum is small there.
     """

@@ -24,7 +24,7 @@ from pydantic_core import PydanticCustomError
 from surgsim.catalog import Name, PartConfig
 from surgsim.control.controller import ControllerConfig
 from surgsim.display import joined_names
-from surgsim.errors import SurgsimError, not_held
+from surgsim.errors import SurgsimError, UnknownNameError, unknown_name
 from surgsim.models.build import Scene, SharedArm, build, build_shared
 from surgsim.models.collision import abdomen_semi_axes
 from surgsim.models.config import InstrumentConfig, PatientConfig, RobotConfig, TrocarConfig
@@ -254,7 +254,7 @@ def index_of(arm: str, names: tuple[str, ...]) -> int:
         UnknownNameError: If there is no such arm.
     """
     if arm not in names:
-        raise not_held(arm, "known arm of this scenario", names, "its names")
+        raise UnknownNameError(unknown_name(arm, "arm of this scenario", names))
     return names.index(arm)
 
 

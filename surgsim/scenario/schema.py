@@ -247,6 +247,11 @@ class Scenario(PartConfig):
         return self.robot.drives is not None
 
     @property
+    def rolls_instrument(self) -> bool:
+        """Whether the task needs the instrument to be rolled."""
+        return bool(getattr(self.task, "rolls_instrument", False))
+
+    @property
     def scene(self) -> SceneConfig:
         """What is compiled into the MuJoCo model."""
         return SceneConfig(

@@ -11,7 +11,7 @@ from surgsim.models.arm import ArmModel
 from surgsim.models.build import SharedArm, build_shared
 from surgsim.plant.between import ArmsWatch
 from surgsim.plant.dynamic import DynamicPlant, DynamicPlantConfig
-from surgsim.plant.kinematic import KinematicPlant
+from surgsim.plant.kinematic import KinematicPlant, KinematicPlantConfig
 from surgsim.plant.several import SharedPlant
 from surgsim.scenario.arms import ArmsScenario
 from surgsim.simulate.setup import Setup, beginning, check_times, controller_of
@@ -86,8 +86,10 @@ def prepare_arms(scenario: ArmsScenario) -> ArmsSetup:
             if isinstance(one.plant, DynamicPlantConfig):
                 seed, books = one.run_seed(), one.plant.energy_ledger
                 plant = DynamicPlant(scenes[name], period, parts[name], seed, energy_ledger=books, data=data)
-            else:
+            elif isinstance(one.plant, KinematicPlantConfig):
                 plant = KinematicPlant(scenes[name], period, data=data)
+            else:
+                raise SurgsimError(f"several arms share a dynamic or kinematic plant, not '{one.plant.type}'")
             arms[name] = Setup(
                 scenario=one,
                 scene=scenes[name],

@@ -153,11 +153,11 @@ def _check_bore(scenario: Scenario, trocar: TrocarConfig) -> None:
     instrument = scenario.instrument
     if instrument is None or trocar.wall is None or not instrument.p_ST.any():
         return
-    width = instrument.tip_from_shaft_m[0] + instrument.shaft_diameter_m
+    width = 2.0 * instrument.tip_from_shaft_m[0] + instrument.shaft_diameter_m
     if width > trocar.bore_diameter_m:
         raise SurgsimError(
-            f"{scenario.name}: the instrument's bent part is {1e3 * width:.1f} mm wide with the shaft, and "
-            f"the bore {1e3 * trocar.bore_diameter_m:.1f} mm: it cannot be inserted. Give a "
+            f"{scenario.name}: with the shaft on its axis the instrument's bent part needs a bore of "
+            f"{1e3 * width:.1f} mm, and this is one of {1e3 * trocar.bore_diameter_m:.1f} mm. Give a "
             f"trocar.bore_diameter_m of {width:.4f}, or trocar.wall: null"
         )
 

@@ -113,6 +113,12 @@ class TeleoperationConfig(PartConfig):
         return self
 
     @model_validator(mode="after")
+    def _a_goal_s_roll_is_passed_on(self) -> Self:
+        if not self.roll.use and any(goal.roll_deg for goal in self.goals):
+            raise ValueError("roll_deg of a goal turns the grip alone: roll.use passes it on")
+        return self
+
+    @model_validator(mode="after")
     def _filter_fits_the_scheme(self) -> Self:
         if self.tremor_filter.type != "none" and self.bilateral.type != "passive_convex":
             raise ValueError(
@@ -120,6 +126,11 @@ class TeleoperationConfig(PartConfig):
                 f"the handle: '{self.bilateral.type}' takes what the handle tells for the motion of its port"
             )
         return self
+
+    @property
+    def rolls_instrument(self) -> bool:
+        """Whether the grip rolls the instrument."""
+        return self.roll.use
 
     def check(self, scenario: Surroundings) -> None:
         """Refuse what does not fit the rest of the scenario.
@@ -226,7 +237,7 @@ class Teleoperation:
         for side in (near, far):
             side.period_s = self._period
             take(side.receiver, c.receiver)
-            describe_roll(side.roll, c.roll, self._period)
+            describe_roll(side.roll, c.roll)
             describe_law(side, c.bilateral, self._scheme)
         if self._scheme:
             begin = self.gains.size - self._scheme.gains.size

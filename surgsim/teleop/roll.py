@@ -21,22 +21,20 @@ class RollConfig(PartConfig):
 
 
 class RollLaw(Record):
-    """Numbers of the roll: as in `RollConfig`, and the control period.
+    """Numbers of the roll: as in `RollConfig`.
 
     Attributes:
         use: Whether the grip rolls the instrument.
         gain_per_s: k of `roll_rate`.
-        period_s: Control period [s].
     """
 
     use: int
     gain_per_s: float
-    period_s: float
 
 
-def describe_roll(law: RollLaw, config: RollConfig, period_s: float) -> None:
-    """Fill the numbers for a control period [s]."""
-    law.use, law.gain_per_s, law.period_s = config.use, config.gain_per_s, period_s
+def describe_roll(law: RollLaw, config: RollConfig) -> None:
+    """Fill the numbers."""
+    law.use, law.gain_per_s = config.use, config.gain_per_s
 
 
 @compiled

@@ -15,6 +15,9 @@ MOST_FREQUENCIES = 32
 NONE, LOW_PASS, BMFLC = range(3)
 _TYPES = {"none": NONE, "low_pass": LOW_PASS, "bmflc": BMFLC}
 
+MOST_GAIN = 0.5
+"""Largest mu n of the combiner: an update takes 2 mu n of an error away, here all of it."""
+
 
 class TremorFilterConfig(PartConfig):
     """Filter of the tip position that the handle stands for; its velocity is the difference of positions.
@@ -50,7 +53,8 @@ class TremorFilterConfig(PartConfig):
         """Refuse what a control period [s] cannot sample.
 
         Raises:
-            ValueError: If a frequency in use is not below a tenth of the sampling rate.
+            ValueError: If a frequency in use is not below a tenth of the sampling rate, or the estimate of
+                the tremor would not settle.
         """
         used = {"low_pass": ("cutoff_hz",), "bmflc": ("lowest_hz", "highest_hz"), "none": ()}[self.type]
         for name in used:
@@ -59,6 +63,13 @@ class TremorFilterConfig(PartConfig):
                     f"tremor_filter.{name} {getattr(self, name):g} must be below {0.1 / period_s:g}, a tenth "
                     "of the control rate"
                 )
+        gain = self.adaptation_per_s * period_s * self.frequencies
+        if self.type == "bmflc" and gain > MOST_GAIN:
+            raise ValueError(
+                f"tremor_filter.adaptation_per_s {self.adaptation_per_s:g} is too fast for "
+                f"{self.frequencies} frequencies and a control period of {period_s:g} s: it must be at most "
+                f"{MOST_GAIN / (period_s * self.frequencies):.3g}, or the estimate does not settle"
+            )
 
 
 class TremorFilterLaw(Record):

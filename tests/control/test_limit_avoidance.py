@@ -164,3 +164,32 @@ def test_a_roll_near_the_last_joint_s_limit_is_followed_within_the_acceleration_
     run = surgsim.run("teleop_free_motion_panda", settings=settings)
     assert run.metrics["roll_error_rms_deg"] < 1.0
     assert run.metrics["acceleration_limit_ratio"] < 1.0 + 1e-6
+
+
+NEAR = {
+    "lwr4plus": (2002, 2003, 2011, 2021, 2026, 2030, 2031, 2033),
+    "panda": (2015,),
+    "fr3": (2014,),
+    "iiwa14": (2002, 2003, 2011, 2016, 2021, 2023, 2030, 2033),
+}
+"""Seeds from 2000 to 2039 of the random scenarios whose runs come within 0.2 rad of a limit."""
+
+
+@pytest.mark.slow
+def test_the_room_that_is_left_is_mostly_what_geometry_allows():
+    lacking = []
+    for name, seeds in NEAR.items():
+        for seed in seeds:
+            run = surgsim.run(f"random_{name}", controller="rcm_inverse_dynamics", seed=seed)
+            arm, port = ArmModel(run.scenario.scene), np.array(run.scenario.trocar.position_m)
+            low, high = arm.limits.q_min, arm.limits.q_max
+            room = np.minimum(run.trace.block("q") - low, high - run.trace.block("q")).min(axis=1)
+            assert room.min() < 0.2
+            q = run.trace.block("q")[room.argmin()]
+            curve = SelfMotion(arm, margin_rad=0.0).swivel_curve(
+                q, arm.kinematics(q).p_WT, port, step_rad=0.01
+            )
+            most = max(min((point.q - low).min(), (high - point.q).min()) for point in curve)
+            lacking.append(most - room.min())
+    assert sum(gap < 1e-3 for gap in lacking) >= 14
+    assert max(lacking) < 0.1

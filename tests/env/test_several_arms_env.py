@@ -102,7 +102,7 @@ def test_gymnasium_s_checker_passes():
 def test_which_arm_it_is_must_be_said():
     with pytest.raises(SurgsimError, match="two_ports_panda has the arms left, right: say by arm which one"):
         gymnasium.make("surgsim/Two-Ports-Panda-v0")
-    with pytest.raises(SurgsimError, match="'top' is not a known arm of this scenario"):
+    with pytest.raises(SurgsimError, match=r"'top' is not an arm of this scenario\. Known: "):
         load("two_ports_panda", arm="top")
     with pytest.raises(SurgsimError, match="circle_panda has one arm: leave out arm, 'left'"):
         load(load_scenario("circle_panda"), arm="left")

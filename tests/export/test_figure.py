@@ -180,8 +180,30 @@ def test_a_table_that_is_too_long_for_a_figure_names_those_that_are_not():
 
 
 def test_every_study_of_the_results_has_a_figure(told, tmp_path, request):
-    for folder, table in (("vprnn", "comparison"), ("bilateral_schemes", "winners")):
+    tables = {
+        "vprnn": "comparison",
+        "bilateral_schemes": "winners",
+        "manipulability_validation": "table_4",
+        "passive_teleoperation": "frontier",
+    }
+    for folder, table in tables.items():
         study = request.config.rootpath / "results" / folder
         file = tmp_path / f"{folder}.svg"
         assert told(study, "--study-table", table, "--figure", file) == (0, "")
         assert file.stat().st_size > 10_000
+
+
+def test_what_no_axis_holds_is_told():
+    mixed = [{"figure": "tip error (mm)", "paper": 1.0}, {"figure": "lowest tank (J)", "paper": 2.0}]
+    few = swept((0, 1, 2), "ab")
+    with pytest.raises(SurgsimError, match=r"'mixed' of made has rows of different units.* another: few$"):
+        study_axes(Rows(mixed=mixed, few=few))
+    with pytest.raises(SurgsimError, match=r"'words' of made has no column of numbers$"):
+        study_axes(Rows(words=[{"claim": "a", "verdict": "holds"}, {"claim": "b", "verdict": "fails"}]))
+
+
+def test_columns_with_a_unit_come_first():
+    rows = [{"home": k, "pinv": 0.1, "pinv_off_percent": 2.0 + k} for k in range(3)]
+    (ax,) = study_axes(Rows(homes=rows), columns=["pinv_off_percent"])
+    assert ax.get_xlabel() == "pinv off [%]"
+    assert study_axes(Rows(homes=rows))[0].get_xlabel() == "pinv off [%]"

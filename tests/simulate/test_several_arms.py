@@ -302,7 +302,7 @@ def test_what_cannot_be_said_of_several_arms_is_refused_with_its_key(more, said)
 def test_what_is_for_one_arm_says_so():
     with pytest.raises(ScenarioError, match="arms: a scenario of one arm is needed here"):
         load_scenario("two_ports_panda")
-    with pytest.raises(UnknownNameError, match="'top' is not a known arm of this scenario"):
+    with pytest.raises(UnknownNameError, match=r"'top' is not an arm of this scenario\. Known: "):
         apart().of("top")
 
 

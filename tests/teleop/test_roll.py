@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from surgsim.errors import ScenarioError
 from surgsim.metrics.catalog import METRICS
 from surgsim.models.arm import ArmModel
 from surgsim.scenario.load import load_scenario
@@ -42,9 +43,9 @@ def test_the_grip_is_turned_about_its_own_axis():
 
 def test_the_rate_is_as_received_and_draws_an_error_back():
     law = new(RollLaw, 0)
-    describe_roll(law, RollConfig(use=True, gain_per_s=3.0), T)
+    describe_roll(law, RollConfig(use=True, gain_per_s=3.0))
     assert roll_rate(law, 0.5, 0.2, 1.0, 0.9) == pytest.approx(0.5 * (0.2 + 3.0 * 0.1))
-    describe_roll(law, RollConfig(), T)
+    describe_roll(law, RollConfig())
     assert roll_rate(law, 0.5, 0.2, 1.0, 0.9) == 0.0
 
 
@@ -63,7 +64,7 @@ def test_the_instrument_rolls_as_far_as_the_grip_was_turned():
 
 
 def test_without_it_nothing_rolls_and_there_is_no_error():
-    _, run = rolled()
+    _, run = rolled(GOALS.replace(", roll_deg: 60", ""))
     assert run["operator_done"][-1]
     assert (run["roll_command_rad"] == 0.0).all()
     assert np.abs(run["roll_rad"]).max() < 0.01
@@ -99,3 +100,10 @@ def test_an_open_clutch_passes_on_no_roll():
     arrived = run["roll_command_rad"][opened[0] + 151 :]
     assert arrived[0] > 0.02
     assert np.ptp(arrived) == 0.0
+
+
+def test_a_roll_that_nothing_would_follow_is_refused():
+    with pytest.raises(ScenarioError, match=r"roll_deg of a goal turns the grip alone: roll.use"):
+        load_scenario("teleop_free_motion_panda", assignments=(GOALS,))
+    with pytest.raises(ScenarioError, match=r"resolver 'pinv' leaves the roll free: passive_qp and"):
+        load_scenario("teleop_free_motion_panda", controller="joint_impedance", assignments=(GOALS, ON))

@@ -115,3 +115,9 @@ def test_what_a_filter_cannot_do_is_refused():
     keys = ("task.tremor_filter={type: low_pass, cutoff_hz: 200}",)
     with pytest.raises(SurgsimError, match=r"tremor_filter.cutoff_hz 200 must be below 100, a tenth"):
         load_scenario("teleop_free_motion_panda", assignments=keys)
+    keys = (
+        "task.tremor_filter={type: bmflc, lowest_hz: 2, highest_hz: 8, step_hz: 0.2, adaptation_per_s: 5}",
+        "simulation={timestep_s: 0.001, control_period_s: 0.01}",
+    )
+    with pytest.raises(SurgsimError, match=r"adaptation_per_s 5 is too fast for 31 .* at most 1.61"):
+        load_scenario("teleop_free_motion_panda", assignments=keys)

@@ -1,6 +1,6 @@
 """External: a controller outside surgsim gives the joint velocities, in place of a resolver."""
 
-from typing import Literal
+from typing import ClassVar, Literal
 
 from surgsim.array import Array
 from surgsim.compiled import compiled
@@ -23,6 +23,7 @@ class ExternalConfig(ExternalPartConfig):
         gives: What it answers.
     """
 
+    follows_roll: ClassVar[bool] = True  # it is told of it
     type: Literal["external"] = "external"
     gives: Literal["joint_velocity"] = "joint_velocity"
 

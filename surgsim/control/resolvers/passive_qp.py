@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 from pydantic import AfterValidator, Field, NonNegativeFloat, PositiveFloat
@@ -66,6 +66,7 @@ class PassiveQpConfig(PartConfig):
         solver: `active_set`, `daqp`, `osqp`, or another solver that qpsolvers finds installed, by its name.
     """
 
+    follows_roll: ClassVar[bool] = True
     type: Literal["passive_qp"] = "passive_qp"
     velocity_weight: PositiveFloat = 1.0
     slack_weight: PositiveFloat = 1e6

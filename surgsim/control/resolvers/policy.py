@@ -13,7 +13,7 @@ from surgsim.control.inside import resolve_below
 from surgsim.control.joining import memory_size
 from surgsim.control.policies.asking import ACTION, Asker, ask, asking_gains
 from surgsim.control.policies.registry import find_policy
-from surgsim.control.redundancy import redundancy_needed, shares_null_space
+from surgsim.control.redundancy import follows_roll, redundancy_needed, shares_null_space
 from surgsim.control.resolvers import RESOLVERS
 from surgsim.control.resolvers.base import KernelResolver
 from surgsim.control.resolvers.pinv import PinvConfig
@@ -58,6 +58,11 @@ class PolicyConfig(PartConfig):
     def shares_null_space(self) -> bool:
         """Whether the resolver of a tip velocity does."""
         return self.action == "tip_velocity" and shares_null_space(self.resolver)
+
+    @property
+    def follows_roll(self) -> bool:
+        """Whether the resolver of a tip velocity does; joint velocities may."""
+        return self.action == "joint_velocity" or follows_roll(self.resolver)
 
     def check(self, scenario: Surroundings) -> None:
         """Refuse a scenario that the resolver of a tip velocity does not fit."""

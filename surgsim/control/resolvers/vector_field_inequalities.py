@@ -1,7 +1,7 @@
 """Vector-field inequalities: the shaft inside a sphere about the port, as a row of a quadratic program."""
 
 from collections.abc import Mapping
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 from pydantic import AfterValidator, Field, NonNegativeFloat, PositiveFloat
@@ -54,6 +54,7 @@ class VectorFieldInequalitiesConfig(PartConfig):
         solver: `active_set`, `daqp`, `osqp`, or another solver that qpsolvers finds installed, by its name.
     """
 
+    follows_roll: ClassVar[bool] = True
     type: Literal["vector_field_inequalities"] = "vector_field_inequalities"
     entry_radius_m: PositiveFloat = 0.0005
     eta_per_s: PositiveFloat = 2.0
