@@ -86,7 +86,7 @@ def _one(options: argparse.Namespace) -> int:
     from surgsim.cli.score_table import print_score
     from surgsim.cli.table import print_prose
     from surgsim.protocol.passport_files import write_passport
-    from surgsim.protocol.reading import baselines_of, scores_below
+    from surgsim.protocol.reading import baselines_of, scores_below, why_none_beside
     from surgsim.protocol.score import check_out, score, write_score
 
     wish = _wish(options)
@@ -99,7 +99,10 @@ def _one(options: argparse.Namespace) -> int:
         print_prose(f"{_store(options)}: other shards' runs are missing; the same command goes on")
         return 1
     write_score(out, found)
-    left_out = write_passport(out, found, baselines_of(found, others, wish.protocol), wish.protocol.config)
+    beside = baselines_of(found, others, wish.protocol)
+    left_out = write_passport(out, found, beside, wish.protocol.config)
+    if others and not beside:
+        print_prose(f"surgsim: {why_none_beside(found, others)}", sys.stderr)
     if options.json:
         print(json.dumps(found.content, indent=2))
     else:

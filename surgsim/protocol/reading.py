@@ -65,6 +65,16 @@ def baselines_of(score: Score, others: Iterable[Score], protocol: Protocol) -> l
     return [other for other in found if other.name in names] or found[:_MOST]
 
 
+def why_none_beside(score: Score, others: Iterable[Score]) -> str:
+    """Why none of `others` is drawn beside `score`, in a line."""
+    mine = score.content["protocol_sha256"]
+    drafts = sorted({other.content["protocol_sha256"][:8] for other in others} - {mine[:8]})
+    if drafts:
+        name = score.content["protocol"]
+        return f"no score is drawn beside it: those are of {name} {', '.join(drafts)}, this is of {mine[:8]}"
+    return "no score is drawn beside it: none is of its track, seeds and arms"
+
+
 def _of_arms(score: Score, arms: list[str], protocol: Protocol) -> Score:
     """`score` with the runs of these arms alone."""
     if score.content["arms"] == arms:

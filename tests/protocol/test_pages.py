@@ -12,7 +12,7 @@ from surgsim.protocol.board import Board, make_board
 from surgsim.protocol.passport_files import write_passport
 from surgsim.protocol.passport_page import passport_page
 from surgsim.protocol.places import ordered, place_of
-from surgsim.protocol.reading import baselines_of, scores_below
+from surgsim.protocol.reading import baselines_of, scores_below, why_none_beside
 from surgsim.protocol.score import FILES, Means
 from surgsim.protocol.seeds import Seeds
 from surgsim.protocol.wording import axis_told, figure_told, sentence, tuning_told
@@ -114,6 +114,15 @@ def test_a_passport_stands_beside_the_baselines_of_its_track(board, whole):
     assert [score.name for score in found] == ["pinv"]
     assert "pinv" in (out / "nominal" / "joint_impedance" / "passport.html").read_text(encoding="utf-8")
     assert baselines_of(made[2], scores_below(out), protocol) == []
+
+
+def test_it_is_told_why_nothing_stands_beside_a_score(board):
+    _, made = board
+    score, former = made[0], replace(made[1], content={**made[1].content, "protocol_sha256": "0" * 64})
+    name, mine = score.content["protocol"], score.content["protocol_sha256"][:8]
+    told = why_none_beside(score, [former])
+    assert told == f"no score is drawn beside it: those are of {name} 00000000, this is of {mine}"
+    assert why_none_beside(score, made[2:]).endswith("none is of its track, seeds and arms")
 
 
 def test_a_baseline_of_more_arms_is_cut_to_those_of_the_score(scored, whole):
