@@ -191,6 +191,7 @@ AT_ITS_LIMIT = (
     "task.radius_m=0.05",
     "task.start_m=[0.05, 0.55, 0.02]",
     "start.q_rad=[1.6029550, -0.5106133, -2.9570597, -1.4358331, -0.3720263, 1.2775577, 0.57]",
+    "controller.limit_zone_rad=0",
 )
 
 
@@ -204,6 +205,15 @@ def test_a_tip_given_up_at_a_joint_limit_completes_and_is_not_done():
     assert not found.success
     assert found.reason == "tip_error_max_mm 5.61 exceeds 3, docs/safety.md, joint 3 at its limit"
     assert found.line() == f"NOT done: {found.reason}."
+
+
+def test_motion_away_from_joint_limits_keeps_the_same_tip_on_its_path():
+    keys = [*AT_ITS_LIMIT, "controller.limit_zone_rad=0.2"]
+    trace = simulate(load_scenario("circle_lwr4plus", controller="pinv", assignments=keys))
+    metrics = compute_metrics(trace)
+    assert judge(trace, metrics).success
+    assert metrics["tip_error_max_mm"] < 0.1
+    assert metrics["joint_limit_margin_min_rad"] == pytest.approx(0.01, abs=1e-3), "where it begins"
 
 
 def test_joints_at_their_limit_are_named_whether_or_not_the_task_was_done():
