@@ -73,7 +73,7 @@ class ControllerConfig(PartConfig):
 
     def check(self, scenario: Surroundings) -> None:
         """Refuse a scenario that one of the parts does not fit, or whose roll no part follows."""
-        if scenario.rolls_instrument and not follows_roll(self.resolver):
+        if scenario.rolls_instrument and not (follows_roll(self.resolver) or follows_roll(self.torque_law)):
             raise ValueError(
                 f"the task rolls the instrument, and resolver '{self.resolver.type}' leaves the roll free: "
                 "passive_qp and vector_field_inequalities follow it"

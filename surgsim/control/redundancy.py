@@ -25,7 +25,7 @@ def shares_null_space(config: object) -> bool:
 
 
 def follows_roll(config: object) -> bool:
-    """Whether the resolver of `config` moves the roll about the shaft as commanded, `follows_roll` of it."""
+    """Whether the part of `config` moves the roll about the shaft as commanded, `follows_roll` of it."""
     return bool(getattr(config, "follows_roll", False))
 
 

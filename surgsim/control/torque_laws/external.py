@@ -1,6 +1,6 @@
 """External: a controller outside surgsim gives the joint torques, in place of a torque law."""
 
-from typing import Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 
@@ -26,6 +26,7 @@ class ExternalLawConfig(ExternalPartConfig):
         add_bias: Whether gravity, Coriolis and centrifugal torque of the nominal model are added.
     """
 
+    follows_roll: ClassVar[bool] = True  # it is told of it
     type: Literal["external"] = "external"
     gives: Literal["joint_torque"] = "joint_torque"
     add_bias: bool = True

@@ -1,6 +1,6 @@
 """Policy: a callable that gives joint torques, in place of a torque law."""
 
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field
@@ -25,6 +25,7 @@ class PolicyLawConfig(PartConfig):
         decimation: The policy is asked once in that many control ticks; its action holds in between.
     """
 
+    follows_roll: ClassVar[bool] = True  # it is told of it
     type: Literal["policy"] = "policy"
     name: str = "damping"
     add_bias: bool = True
