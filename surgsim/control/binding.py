@@ -87,8 +87,14 @@ def new_control(
     c.has_law, c.at_reference, c.corrects = has_law, at_reference, corrects
     c.command.budget_j, c.adds_avoidance = np.inf, adds_avoidance
     for seen in (c.seen, c.referred):
-        fill_constants(seen, arm, dt_s=dt_s, has_trocar=has_trocar, omega_gain=omega_gain)
-        seen.limit_zone = limit_zone_rad
+        fill_constants(
+            seen,
+            arm,
+            dt_s=dt_s,
+            has_trocar=has_trocar,
+            omega_gain=omega_gain,
+            limit_zone_rad=limit_zone_rad,
+        )
     arm.point(c.measured)
     arm.point(c.reference)
     return c

@@ -6,6 +6,7 @@ solve a program, with limits and tasks of their own, have it in their objective 
 
 from surgsim.array import Array
 from surgsim.compiled import compiled
+from surgsim.control.resolvers.rows import fill_roll_row
 from surgsim.tick.algebra import nearest
 from surgsim.tick.arrays import Resolved, Seen
 from surgsim.tick.scratch import scratch, scratch_matrix
@@ -54,11 +55,7 @@ def fill_avoidance(seen: Seen, rolls: bool, away: Array) -> bool:
     J[:3] = seen.Jv_WT
     J[3 : 3 + seen.rows] = seen.J_rcm[: seen.rows]
     if rolls:
-        for j in range(n):
-            s = 0.0
-            for i in range(3):
-                s += seen.R_WT[i, 2] * seen.Jw_WT[i, j]
-            J[m - 1, j] = s
+        fill_roll_row(seen, J[m - 1])
     found: bool = nearest(J, still, away, away)
     return found
 

@@ -35,6 +35,7 @@ class VelocityProblem:
         upper: Upper velocity bounds Omega (n,) [rad/s].
         limits: The arm's joint limits.
         position_gain_per_s: alpha of Omega [1/s].
+        limit_zone_rad: How near the end of a joint's range the null space leads away from it; 0: never [rad].
         wrench: What a force-torque sensor at the flange measures; None without one.
     """
 
@@ -51,6 +52,7 @@ class VelocityProblem:
     upper: Array
     limits: JointLimits
     position_gain_per_s: float
+    limit_zone_rad: float = 0.0
     wrench: Wrench | None = None
 
     @property

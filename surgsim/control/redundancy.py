@@ -1,4 +1,7 @@
-"""How many degrees of freedom a part of a controller needs beside those that its tasks take."""
+"""What a part of a controller says of the degrees of freedom beside those that its tasks take.
+
+How many it needs, whether others may move them, and whether it follows a commanded roll.
+"""
 
 from surgsim.control.resolvers.base import ResolverConfig
 from surgsim.control.torque_laws.base import TorqueLawConfig

@@ -17,12 +17,19 @@ _blanks: WeakKeyDictionary[ArmModel, dict[tuple[float, bool, float], Seen]] = We
 
 
 def fill_constants(
-    seen: Seen, arm: ArmModel, *, dt_s: float, has_trocar: bool, omega_gain: float, shared: bool = False
+    seen: Seen,
+    arm: ArmModel,
+    *,
+    dt_s: float,
+    has_trocar: bool,
+    omega_gain: float,
+    limit_zone_rad: float = 0.0,
+    shared: bool = False,
 ) -> None:
     """Write what does not change over a run."""
     limits = arm.limits
     seen.dt_s, seen.omega_gain, seen.budget_j, seen.first = dt_s, omega_gain, np.inf, 1
-    seen.has_trocar, seen.rows = has_trocar, RCM_ROWS * has_trocar
+    seen.has_trocar, seen.rows, seen.limit_zone = has_trocar, RCM_ROWS * has_trocar, limit_zone_rad
     seen.damping[:] = arm.damping
     seen.p_WC[:] = np.nan
     seen.q_min[:], seen.q_max[:], seen.v_max[:] = limits.q_min, limits.q_max, limits.velocity
@@ -103,6 +110,7 @@ def velocity_problem_of(seen: Fields, limits: JointLimits) -> VelocityProblem:
         upper=seen["upper"].copy(),
         limits=limits,
         position_gain_per_s=seen["omega_gain"].item(),
+        limit_zone_rad=seen["limit_zone"].item(),
         wrench=wrench_of(seen),
     )
 
@@ -117,6 +125,7 @@ def seen_of_velocity(problem: VelocityProblem, arm: ArmModel) -> Seen:
 def fill_velocity_problem(seen: Seen, problem: VelocityProblem) -> None:
     """Write what a resolver is given into a record."""
     seen["t_s"], seen["dt_s"], seen["omega_gain"] = problem.t_s, problem.dt_s, problem.position_gain_per_s
+    seen["limit_zone"] = problem.limit_zone_rad
     seen["q"], seen["v"] = problem.q, problem.v
     fill_kinematics(seen, problem.kin)
     fill_rcm_of(seen, problem.rcm)

@@ -8,10 +8,11 @@ import numpy as np
 
 from surgsim.array import Array
 from surgsim.compare.leaderboard import leaderboard
-from surgsim.compare.observations import Observations, metric_named
+from surgsim.compare.observations import Observations
 from surgsim.errors import SurgsimError
 from surgsim.export.names import told_apart
 from surgsim.export.paper_style import (
+    LOGARITHMIC,
     SUFFIXES,
     colours,
     figure_bytes,
@@ -19,8 +20,8 @@ from surgsim.export.paper_style import (
     new_figure,
     strokes,
 )
-from surgsim.export.study_figure import LOGARITHMIC, study_figure
-from surgsim.export.subjects import BatchSubject, RunSubject, StudySubject, Subject, arm_by_arm
+from surgsim.export.study_figure import study_figure
+from surgsim.export.subjects import BatchSubject, RunSubject, StudySubject, Subject, arm_by_arm, check_metrics
 from surgsim.export.written import write_whole
 from surgsim.metrics.catalog import METRICS
 from surgsim.recording.polyline import drawn_rows
@@ -74,9 +75,7 @@ def write_figure(
         SurgsimError: If there is nothing to draw, a run was not recorded, a metric is unknown, or the disk
             refuses.
     """
-    if not any(isinstance(subject, StudySubject) for subject in subjects):
-        for name in metrics:
-            metric_named(name)
+    check_metrics(subjects, metrics)
     subjects = arm_by_arm(subjects)
     runs = [subject for subject in subjects if isinstance(subject, RunSubject)]
     with journal_style():

@@ -20,6 +20,9 @@ if TYPE_CHECKING:
 WIDTHS_IN = {"column": 3.5, "page": 7.2}
 """Widths of a journal's column and page [inch]."""
 
+LOGARITHMIC = 20.0
+"""Ratio of the largest to the smallest of what is compared above which an axis is logarithmic."""
+
 COLOURS = tuple(
     map(
         hexadecimal,

@@ -13,15 +13,12 @@ from typing import Any
 import numpy as np
 
 from surgsim.errors import SurgsimError, unknown_name
-from surgsim.export.paper_style import COLOURS, colours, new_figure, strokes
+from surgsim.export.paper_style import COLOURS, LOGARITHMIC, colours, new_figure, strokes
 from surgsim.export.subjects import StudySubject
 from surgsim.studies.tables import Row, groups, numbers
 
 MOST_ROWS, MOST_LINES, FEWEST_PLACES = 40, len(COLOURS), 3
 """Rows of points, lines, and places on a line that make it one."""
-
-LOGARITHMIC = 20.0
-"""Ratio of the largest to the smallest of what is compared above which an axis is logarithmic."""
 
 _MOST_COLUMNS = 2
 _NAMES = ("seed", "home")

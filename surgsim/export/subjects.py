@@ -7,6 +7,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+from surgsim.compare.observations import metric_named
 from surgsim.compare.unfinished import has_table
 from surgsim.errors import RecordingError, SurgsimError, unknown_name
 from surgsim.metrics.catalog import of_one_arm
@@ -158,6 +159,17 @@ class StudySubject:
 
 
 Subject = RunSubject | BatchSubject | StudySubject
+
+
+def check_metrics(subjects: Sequence[Subject], metrics: Sequence[str]) -> None:
+    """Refuse a metric that there is not; of a study the columns of its table are named.
+
+    Raises:
+        SurgsimError: Then.
+    """
+    if not any(isinstance(subject, StudySubject) for subject in subjects):
+        for name in metrics:
+            metric_named(name)
 
 
 def find(name: str) -> Subject:

@@ -6,12 +6,12 @@ from pathlib import Path
 import numpy as np
 
 from surgsim.compare.leaderboard import LeaderboardRow, leaderboard
-from surgsim.compare.observations import Observations, metric_named
+from surgsim.compare.observations import Observations
 from surgsim.compare.wording import bracket, heading_of, number
 from surgsim.errors import SurgsimError, unknown_name
 from surgsim.export.paper_table import WRITERS, PaperColumn, PaperTable
 from surgsim.export.study_figure import keys_of
-from surgsim.export.subjects import BatchSubject, RunSubject, StudySubject, Subject, arm_by_arm
+from surgsim.export.subjects import BatchSubject, RunSubject, StudySubject, Subject, arm_by_arm, check_metrics
 from surgsim.export.written import write_whole
 from surgsim.metrics.catalog import METRICS
 from surgsim.studies.tables import Cell, format_cell
@@ -50,9 +50,7 @@ def table_of(
     subjects: Sequence[Subject], metrics: Sequence[str] = (), study_table: str | None = None
 ) -> PaperTable:
     """The table, see `write_table`."""
-    if not any(isinstance(subject, StudySubject) for subject in subjects):
-        for name in metrics:
-            metric_named(name)
+    check_metrics(subjects, metrics)
     subjects = arm_by_arm(subjects)
     runs = [subject for subject in subjects if isinstance(subject, RunSubject)]
     if len(runs) == len(subjects):

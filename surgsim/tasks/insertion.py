@@ -71,9 +71,9 @@ def _hold(gains: Array, out: arrays.Command) -> None:
 
 
 @compiled
-def _along(gains: Array, times: Array, t_s: float, a: Array, b: Array, out: arrays.Command) -> None:
+def _along(gains: Array, timing: Array, t_s: float, a: Array, b: Array, out: arrays.Command) -> None:
     """On the straight way from `a` to `b`."""
-    s, s_dot, s_ddot = progress(times[0], times[1], times[2], t_s)
+    s, s_dot, s_ddot = progress(timing[0], timing[1], timing[2], t_s)
     for i in range(3):
         way = b[i] - a[i]
         out.p_WTd[i], out.v_WTd[i], out.a_WTd[i] = a[i] + s * way, s_dot * way, s_ddot * way

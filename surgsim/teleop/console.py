@@ -1,6 +1,7 @@
 """The master console: a force-controlled haptic arm in its own MuJoCo model, with its energy account."""
 
 import math
+from functools import cache
 from typing import ClassVar
 
 import mujoco
@@ -320,8 +321,9 @@ class Console:
         measure_console(law, memory)
 
 
+@cache
 def home_room_rad() -> float:
-    """Way from the home pose to the nearest stop of a joint [rad]."""
+    """Way from the home pose to the nearest stop of a joint [rad]; every check of a teleoperation asks."""
     model = load_console()
     home = model.key("home").qpos
     return float(min((home - model.jnt_range[:, 0]).min(), (model.jnt_range[:, 1] - home).min()))

@@ -381,8 +381,9 @@ def _close_jaw(law: OperatorLaw, gains: Array, operator: Operator) -> None:
 def _turn(law: OperatorLaw, gains: Array, operator: Operator) -> None:
     """Turn the grip as the goal, or the last one, wants it."""
     if law.goal_count > 0:
-        left = _goal(law, gains, min(operator.index, law.goal_count - 1))[TURNED] - operator.roll
+        wanted = _goal(law, gains, min(operator.index, law.goal_count - 1))[TURNED]
+        left = wanted - operator.roll
         if abs(left) <= law.roll_step:
-            operator.roll = _goal(law, gains, min(operator.index, law.goal_count - 1))[TURNED]
+            operator.roll = wanted
         else:
             operator.roll += law.roll_step if left > 0.0 else -law.roll_step

@@ -1,5 +1,7 @@
 """Null-space motion away from joint limits: the formula, and what it does to runs that begin near one."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -11,12 +13,14 @@ from surgsim.control.resolvers import RESOLVERS
 from surgsim.control.resolvers.hands_on import HandsOnConfig
 from surgsim.control.resolvers.pinv import PinvConfig
 from surgsim.control.resolvers.policy import PolicyConfig
+from surgsim.control.resolvers.qp import QpConfig
 from surgsim.control.resolvers.self_motion import SelfMotionConfig
-from surgsim.control.seen import fill_kinematics, new_seen
+from surgsim.control.seen import fill_kinematics, new_seen, seen_of_velocity, velocity_problem_of
 from surgsim.control.self_motion import SelfMotion
 from surgsim.models.arm import ArmModel
 from surgsim.scenario.load import load_scenario
 from surgsim.tick.arrays import Resolved, new
+from surgsim.tick.fields import fields_of
 
 N, ZONE = 7, 0.2
 SHARING = {"gradient", "mink", "pinv", "rnn", "vprnn"}
@@ -107,6 +111,17 @@ def test_an_answer_stays_where_the_rows_have_lost_rank(arm):
     before = out.qdot.copy()
     keep_from_limits(seen, out)
     np.testing.assert_array_equal(out.qdot, before)
+
+
+def test_a_resolver_that_is_called_from_python_knows_the_zone_too(arm, velocity_problem):
+    q = np.where(np.arange(N) == 1, arm.limits.q_max - 0.05, velocity_problem(0).q)
+    near = velocity_problem(0, q=q)
+    resolver = QpConfig(acceleration_limit=False).build(arm)
+    plain, _ = resolver.step(near, None)
+    led, _ = resolver.step(replace(near, limit_zone_rad=ZONE), None)
+    assert np.abs(led.qdot - plain.qdot).max() > 1e-3
+    seen = seen_of_velocity(replace(near, limit_zone_rad=ZONE), arm)
+    assert velocity_problem_of(fields_of(seen), arm.limits).limit_zone_rad == ZONE
 
 
 def test_which_resolvers_share_their_null_space():

@@ -24,7 +24,7 @@ from surgsim.control.resolvers.program import (
     examined,
     solve_warm,
 )
-from surgsim.control.resolvers.rows import fill_braking
+from surgsim.control.resolvers.rows import fill_braking, fill_roll_row
 from surgsim.control.tip_energy import affordable_speed, fill_tip_inertia
 from surgsim.models.arm import ArmModel
 from surgsim.tick.algebra import dot, norm, times
@@ -213,8 +213,7 @@ def passive_program(gains: Array, seen: Seen, memory: Array, braking: bool) -> P
         low[i] = high[i] = share * seen.v_WTd[i] - gains[K_TIP] * (seen.p_WT[i] - seen.p_WTd[i])
         G[rows - 3 + i, :n] = seen.Jv_WT[i]
         low[rows - 3 + i], high[rows - 3 + i] = -gains[SPEED], gains[SPEED]
-        for j in range(n):
-            G[3, j] += seen.R_WT[i, 2] * seen.Jw_WT[i, j]
+    fill_roll_row(seen, G[3, :n])
     low[3] = high[3] = seen.roll_rate
     for i in range(_SLACKS):
         G[i, n + i] = -1.0

@@ -24,6 +24,15 @@ def fill_task_rows(seen: Seen, k_tip: float, k_rcm: float, J: Array, v: Array) -
 
 
 @compiled
+def fill_roll_row(seen: Seen, row: Array) -> None:
+    """Row d . J_w (n,) of the roll about the shaft, d the shaft's axis."""
+    for j in range(row.size):
+        row[j] = 0.0
+        for i in range(3):
+            row[j] += seen.R_WT[i, 2] * seen.Jw_WT[i, j]
+
+
+@compiled
 def answer(seen: Seen, qdot: Array, J: Array, v: Array, out: Resolved) -> None:
     """`qdot` (n,) projected on Omega, with the residual that this leaves in J q' = v."""
     total = 0.0
