@@ -22,27 +22,27 @@ from surgsim.metrics.metric import Metric, Undefined
 from surgsim.metrics.outside import outside_metrics
 from surgsim.trace.trace import Trace
 
-_SHIPPED: tuple[tuple[Metric, ...], ...] = tuple(
-    tuple(group.METRICS)
-    for group in (
-        accuracy,
-        dexterity,
-        optimality,
-        effort,
-        roughness,
-        smoothness,
-        force,
-        stopping,
-        peg_and_ring,
-        teleoperation,
-        operating,
-        timing,
-    )
+_MODULES = (
+    accuracy,
+    dexterity,
+    optimality,
+    effort,
+    roughness,
+    smoothness,
+    force,
+    stopping,
+    peg_and_ring,
+    teleoperation,
+    operating,
+    timing,
 )
-SHIPPED = frozenset(metric.name for group in _SHIPPED for metric in group)
-"""Names of the metrics that are not of other packages."""
+SHIPPED = {metric.name: module for module in _MODULES for metric in module.METRICS}
+"""Modules of the metrics that are not of other packages, by the metrics' names."""
 _outside = tuple(outside_metrics(SHIPPED).values())
-GROUPS = (*_SHIPPED, *([_outside] if _outside else []))
+GROUPS: tuple[tuple[Metric, ...], ...] = (
+    *(tuple(module.METRICS) for module in _MODULES),
+    *([_outside] if _outside else []),
+)
 """Metrics of one subject, in the order in which they are printed; last those of other packages."""
 
 _LONGEST_REASON = 300

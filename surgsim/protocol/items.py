@@ -1,14 +1,16 @@
 """What a protocol's name stands for, a hash for each part of it."""
 
+import ast
 import hashlib
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
 from surgsim.errors import ScenarioError, SurgsimError
+from surgsim.metrics.catalog import SHIPPED
 from surgsim.protocol.canonical import sha256_of
 from surgsim.protocol.cells import cells_of, reference
-from surgsim.protocol.definition import Protocol, entry_file
+from surgsim.protocol.definition import Protocol, ProtocolConfig, entry_file
 from surgsim.protocol.seeds import Seeds
 from surgsim.resources import resource_dir
 from surgsim.runs.sources import ROOT, hash_of
@@ -19,13 +21,14 @@ PROBE = "0" * 64
 DRAWS = 12
 """Seeds of a drawn generator that stand for all: every kind of path is among them."""
 _CODE = (
-    "metrics",
     "verdict.py",
     "tasks/success.py",
     "tasks/teleoperation_program.py",
+    "teleop/judgement.py",
     "scenario/thresholds.py",
 )
 _SCORE = ("canonical.py", "cells.py", "figures.py", "levels.py", "rows.py", "scorecard.py", "seeds.py")
+_METRICS_PACKAGE = "surgsim.metrics"
 Items = dict[str, str]
 
 
@@ -57,7 +60,7 @@ def items_of(protocol: Protocol, generators: Sequence[str], arms: Sequence[str])
         for arm in arms:
             found[f"scenario/{generator}/{arm}"] = _scenarios(protocol, generator, arm)
     found.update(_assets(arms))
-    found.update(_code())
+    found.update(_code(protocol.config))
     return found
 
 
@@ -99,15 +102,33 @@ def _assets(arms: Sequence[str]) -> Items:
     return {f"asset/{name}": hash_of(_files(root / name)) for name in folders}
 
 
-def _code() -> Items:
-    """Hashes of the modules that make figures of a trace, and of those that make a scorecard of figures."""
-    found = {}
-    for name in _CODE:
-        place = ROOT / name
-        for path in sorted(place.glob("*.py")) if place.is_dir() else [place]:
-            found[f"metric/{path.relative_to(ROOT).as_posix()}"] = _file(path)
+def _code(config: ProtocolConfig) -> Items:
+    """Hashes of the modules that make the protocol's metrics of a trace, and a scorecard of them."""
+    names = {*config.metrics, *config.thresholds.model_fields_set}
+    modules = {SHIPPED[name].__name__ for name in names}
+    paths = [*(ROOT / name for name in _CODE), *sorted(_with_imports(modules))]
+    found = {f"metric/{path.relative_to(ROOT).as_posix()}": _file(path) for path in paths}
     here = Path(__file__).parent
     return {**found, **{f"score/{name}": _file(here / name) for name in _SCORE}}
+
+
+def _with_imports(modules: Iterable[str]) -> set[Path]:
+    """Files of modules of metrics, and of those in the same folder that they import: a new metric is none."""
+    found: set[Path] = set()
+    waiting = [_metric_file(module) for module in modules]
+    while waiting:
+        path = waiting.pop()
+        if path in found:
+            continue
+        found.add(path)
+        tree = ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        imported = [node.module or "" for node in tree if isinstance(node, ast.ImportFrom)]
+        waiting += [_metric_file(name) for name in imported if name.startswith(f"{_METRICS_PACKAGE}.")]
+    return found
+
+
+def _metric_file(module: str) -> Path:
+    return ROOT / "metrics" / f"{module.removeprefix(f'{_METRICS_PACKAGE}.')}.py"
 
 
 def _file(path: Path) -> str:

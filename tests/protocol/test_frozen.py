@@ -63,11 +63,14 @@ def test_a_touched_asset_is_refused_where_it_is_used(tiny, tmp_path, monkeypatch
 
 def test_a_patched_metric_is_refused(tiny, tmp_path, monkeypatch):
     root = tmp_path / "surgsim"
-    for name in ("metrics", "tasks", "scenario"):
+    for name in ("metrics", "tasks", "scenario", "teleop"):
         shutil.copytree(ROOT / name, root / name)
     shutil.copy(ROOT / "verdict.py", root)
     monkeypatch.setattr(items, "ROOT", root)
-    assert check_frozen(tiny, "nominal", ("panda",)) == frozen_sha256(tiny)
+    (root / "metrics" / "new.py").touch()
+    with (root / "metrics" / "catalog.py").open("a") as file:
+        file.write("# that lists it\n")
+    assert check_frozen(tiny, "nominal", ("panda",)) == frozen_sha256(tiny)  # a new metric is no change
     metric = root / "metrics" / "accuracy.py"
     metric.write_text(metric.read_text(encoding="utf-8").replace("1e3", "1e2"), encoding="utf-8")
     with pytest.raises(SurgsimError, match=r"metric/metrics/accuracy.py changed since it was frozen"):
