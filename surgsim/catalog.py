@@ -55,6 +55,13 @@ class Surroundings(Protocol):
         ...
 
 
+ADDED = "added"
+"""Marks a key that came after hashes had been published: `key: Annotated[float | None, ADDED] = None`.
+
+Its default leaves every run as it was before the key, and never changes: with it the key is in no hash.
+"""
+
+
 class PartConfig(BaseModel):
     """Base of every config: frozen, strict, unknown keys refused."""
 

@@ -14,6 +14,7 @@ from surgsim.protocol.definition import Protocol, ProtocolConfig, entry_file
 from surgsim.protocol.seeds import Seeds
 from surgsim.resources import resource_dir
 from surgsim.runs.sources import ROOT, hash_of
+from surgsim.scenario.hashed import hashed
 from surgsim.scenario.load import load_controller
 
 PROBE = "0" * 64
@@ -44,19 +45,21 @@ def all_items(protocol: Protocol) -> Items:
         for scheme in track.schemes:
             found[f"scheme/{title}/{scheme}"] = _scheme(protocol, title, scheme)
         for name in track.entries:
-            found.setdefault(
-                f"entry/{name}", sha256_of(load_controller(entry_file(name)).model_dump(mode="json"))
-            )
+            found.setdefault(f"entry/{name}", sha256_of(hashed(load_controller(entry_file(name)))))
     return dict(sorted(found.items()))
 
 
 def items_of(protocol: Protocol, generators: Sequence[str], arms: Sequence[str]) -> Items:
     """Hashes of what a score of these generators and arms follows from."""
-    told = protocol.config.model_dump(mode="json", exclude={"draft", "generators"})
-    found = {f"definition/{key}": sha256_of(value) for key, value in told.items()}
+    told = hashed(protocol.config)
+    found = {
+        f"definition/{key}": sha256_of(value)
+        for key, value in told.items()
+        if key not in ("draft", "generators")
+    }
     for generator in generators:
         config = protocol.config.generators[generator]
-        found[f"definition/generators/{generator}"] = sha256_of(config.model_dump(mode="json"))
+        found[f"definition/generators/{generator}"] = sha256_of(hashed(config))
         for arm in arms:
             found[f"scenario/{generator}/{arm}"] = _scenarios(protocol, generator, arm)
     found.update(_assets(arms))

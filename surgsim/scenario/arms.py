@@ -4,7 +4,6 @@ An arm of it is a scenario of one arm (`ArmsScenario.of`): whatever is built, re
 is built, recorded and judged of each. Only the model and its time are shared.
 """
 
-import hashlib
 import json
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
@@ -31,6 +30,7 @@ from surgsim.models.config import InstrumentConfig, PatientConfig, RobotConfig, 
 from surgsim.models.theatre import patient_place
 from surgsim.plant.disturbances import DISTURBANCES
 from surgsim.plant.disturbances.base import DisturbanceConfig
+from surgsim.scenario.hashed import sha256_of_config
 from surgsim.scenario.schema import (
     AnyPlant,
     RecordingConfig,
@@ -39,7 +39,6 @@ from surgsim.scenario.schema import (
     SimulationConfig,
     StartConfig,
     default_plant,
-    files_named,
 )
 from surgsim.scenario.thresholds import ThresholdsConfig
 from surgsim.tasks import TASKS
@@ -206,12 +205,8 @@ class ArmsScenario(PartConfig):
         return data
 
     def sha256(self) -> str:
-        """Hash of the resolved scenario; of a file that it names the content counts, not where it stands."""
-        resolved = self.resolved()
-        for arm in resolved["arms"]:
-            files_named(arm)
-        text = json.dumps(resolved, sort_keys=True, separators=(",", ":"))
-        return hashlib.sha256(text.encode()).hexdigest()
+        """Hash of what can change a run; of a file that it names the content counts, not where it stands."""
+        return sha256_of_config(self)
 
 
 _MADE: dict[tuple[str, str], Scenario] = {}

@@ -1,8 +1,6 @@
 """The scenario: one experiment, every default explicit."""
 
-import hashlib
 import json
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 
 import numpy as np
@@ -34,7 +32,7 @@ from surgsim.plant.disturbances.base import DisturbanceConfig
 from surgsim.plant.drive import JointDrives
 from surgsim.plant.part import PlantPart, PlantPartConfig
 from surgsim.plant.props import PROPS
-from surgsim.scenario.files import files_in
+from surgsim.scenario.hashed import sha256_of_config
 from surgsim.scenario.per_joint import check_lists
 from surgsim.scenario.thresholds import ThresholdsConfig
 from surgsim.tasks import TASKS
@@ -286,14 +284,5 @@ class Scenario(PartConfig):
         return data
 
     def sha256(self) -> str:
-        """Hash of the resolved scenario; of a file that it names the content counts, not where it stands."""
-        resolved = self.resolved()
-        files_named(resolved)
-        text = json.dumps(resolved, sort_keys=True, separators=(",", ":"))
-        return hashlib.sha256(text.encode()).hexdigest()
-
-
-def files_named(resolved: dict[str, Any]) -> None:
-    """Let a resolved scenario, or an arm of one, name its files by their last names alone: for a hash."""
-    for mapping, key in files_in(resolved):
-        mapping[key] = Path(mapping[key]).name
+        """Hash of what can change a run; of a file that it names the content counts, not where it stands."""
+        return sha256_of_config(self)
