@@ -19,7 +19,9 @@ REST_M_PER_S = 0.02
 CHATTER_PER_S = 10.0
 """Beginnings and ends of contact in the last second, from which on it chatters."""
 CONTACT_N = 0.1
-"""Least force of a contact [N]."""
+"""A contact begins with more than this at the tip [N]."""
+NO_CONTACT_N = 1e-3
+"""And it ends with less than this [N]: a viscous medium that the tip hardly moves in is not left."""
 _END_S = 0.5
 
 
@@ -55,7 +57,10 @@ def toggles_per_s(run: Columns) -> float:
 
 
 def _touches(run: Columns) -> NDArray[np.bool_]:
-    touches: NDArray[np.bool_] = np.linalg.norm(run.block("tip_force"), axis=1) > CONTACT_N
+    force = np.linalg.norm(run.block("tip_force"), axis=1)
+    told = (force > CONTACT_N) | (force < NO_CONTACT_N)
+    last_told = np.maximum.accumulate(np.where(told, np.arange(len(force)), 0))
+    touches: NDArray[np.bool_] = force[last_told] > CONTACT_N
     return touches
 
 

@@ -69,6 +69,15 @@ def test_how_it_ends():
     assert toggles_per_s(run()) == 0.0
 
 
+def test_a_medium_that_resists_more_and_less_is_in_contact_all_the_time():
+    hovering = along(0.1 + 0.08 * np.sin(2.0 * np.pi * 20.0 * TIME))
+    assert toggles_per_s(run(tip_force=hovering)) == 1.0  # it begins
+    assert ends(run(tip_force=hovering)) == "rests"
+    left = along(np.maximum(0.2 * np.sin(2.0 * np.pi * 20.0 * TIME), 0.0))
+    assert toggles_per_s(run(tip_force=left)) == pytest.approx(40.0, abs=1.0)
+    assert ends(run(tip_force=left)) == "chatters"
+
+
 def test_the_end_s_speed_is_the_larger_of_handle_and_tip():
     moved = run(tip=along(0.03 * TIME), handle_velocity=along(np.full(ROWS, 0.02)))
     assert end_speed(moved) == pytest.approx(0.03)
