@@ -16,6 +16,7 @@ from surgsim.packages import MissingPackageError
 from surgsim.protocol.canonical import sha256_of
 from surgsim.protocol.definition import Protocol, TrackConfig, entry_file, entry_label, with_scheme
 from surgsim.runs.parts import external_names, missing_package
+from surgsim.scenario.hashed import hashed
 from surgsim.scenario.load import find, load_controller, shipped
 
 ANY = "*"
@@ -50,8 +51,8 @@ class Entrant:
 
     @property
     def definition(self) -> dict[str, Any]:
-        """All of the controller, every default explicit, and its scheme if it has one."""
-        content = dict(self.config.model_dump(mode="json"))
+        """All of the controller and its scheme, every default explicit but those that no hash holds."""
+        content = hashed(self.config)
         return {**content, "scheme": self.scheme} if self.scheme else content
 
     @property

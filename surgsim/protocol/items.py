@@ -30,6 +30,7 @@ _CODE = (
 )
 _SCORE = ("canonical.py", "cells.py", "figures.py", "levels.py", "rows.py", "scorecard.py", "seeds.py")
 _METRICS_PACKAGE = "surgsim.metrics"
+_CATALOG = "metrics/catalog.py"
 Items = dict[str, str]
 
 
@@ -106,28 +107,46 @@ def _assets(arms: Sequence[str]) -> Items:
 
 
 def _code(config: ProtocolConfig) -> Items:
-    """Hashes of the modules that make the protocol's metrics of a trace, and a scorecard of them."""
-    names = {*config.metrics, *config.thresholds.model_fields_set}
+    """Hashes of what makes the protocol's metrics of a trace, and a scorecard of them."""
+    names = {*config.metrics, *(name for name, most in config.thresholds if most is not None)}
     modules = {SHIPPED[name].__name__ for name in names}
     paths = [*(ROOT / name for name in _CODE), *sorted(_with_imports(modules))]
     found = {f"metric/{path.relative_to(ROOT).as_posix()}": _file(path) for path in paths}
+    found[f"metric/{_CATALOG}"] = _functions(ROOT / _CATALOG)
     here = Path(__file__).parent
     return {**found, **{f"score/{name}": _file(here / name) for name in _SCORE}}
 
 
+def _functions(path: Path) -> str:
+    """Hash of a module's functions and classes: a list in it may grow."""
+    text = path.read_text(encoding="utf-8")
+    kinds = (ast.FunctionDef, ast.ClassDef)
+    parts = [ast.get_source_segment(text, node) for node in ast.parse(text).body if isinstance(node, kinds)]
+    return sha256_of(parts)
+
+
 def _with_imports(modules: Iterable[str]) -> set[Path]:
-    """Files of modules of metrics, and of those in the same folder that they import: a new metric is none."""
+    """Files of modules of metrics, and of those in the same folder that they import."""
     found: set[Path] = set()
     waiting = [_metric_file(module) for module in modules]
     while waiting:
         path = waiting.pop()
-        if path in found:
-            continue
-        found.add(path)
-        tree = ast.walk(ast.parse(path.read_text(encoding="utf-8")))
-        imported = [node.module or "" for node in tree if isinstance(node, ast.ImportFrom)]
-        waiting += [_metric_file(name) for name in imported if name.startswith(f"{_METRICS_PACKAGE}.")]
+        if path not in found:
+            found.add(path)
+            tree = ast.parse(path.read_text(encoding="utf-8"))
+            waiting += [_metric_file(name) for node in ast.walk(tree) for name in _imported(node)]
     return found
+
+
+def _imported(node: ast.AST) -> Iterable[str]:
+    """Modules of metrics that a statement imports."""
+    if isinstance(node, ast.Import):
+        names = [alias.name for alias in node.names]
+    elif isinstance(node, ast.ImportFrom) and node.module == _METRICS_PACKAGE:
+        names = [f"{_METRICS_PACKAGE}.{alias.name}" for alias in node.names]
+    else:
+        names = [node.module or ""] if isinstance(node, ast.ImportFrom) else []
+    return [name for name in names if name.startswith(f"{_METRICS_PACKAGE}.")]
 
 
 def _metric_file(module: str) -> Path:

@@ -68,9 +68,14 @@ def test_a_patched_metric_is_refused(tiny, tmp_path, monkeypatch):
     shutil.copy(ROOT / "verdict.py", root)
     monkeypatch.setattr(items, "ROOT", root)
     (root / "metrics" / "new.py").touch()
-    with (root / "metrics" / "catalog.py").open("a") as file:
-        file.write("# that lists it\n")
+    catalog = root / "metrics" / "catalog.py"
+    text = catalog.read_text(encoding="utf-8")
+    catalog.write_text(text.replace("    accuracy,\n", "    accuracy,\n    new,\n"), encoding="utf-8")
     assert check_frozen(tiny, "nominal", ("panda",)) == frozen_sha256(tiny)  # a new metric is no change
+    catalog.write_text(text.replace("else active)", "else trace)"), encoding="utf-8")
+    with pytest.raises(SurgsimError, match=r"metric/metrics/catalog.py changed since it was frozen"):
+        check_frozen(tiny, "nominal", ("panda",))
+    catalog.write_text(text, encoding="utf-8")
     metric = root / "metrics" / "accuracy.py"
     metric.write_text(metric.read_text(encoding="utf-8").replace("1e3", "1e2"), encoding="utf-8")
     with pytest.raises(SurgsimError, match=r"metric/metrics/accuracy.py changed since it was frozen"):
