@@ -15,7 +15,7 @@ import numpy as np
 from surgsim.compiled import compiled
 from surgsim.control.external.calls import monotonic
 from surgsim.control.external.exchange import exchange
-from surgsim.control.external.given import giving
+from surgsim.control.external.given_commands import giving
 from surgsim.control.external.layout import JOINT_VELOCITY
 from surgsim.control.external.outside import Outside
 from surgsim.control.seen import new_seen

@@ -10,7 +10,7 @@ import pytest
 import usual_arm
 from batches import short_run
 
-from surgsim.control.external.given import giving
+from surgsim.control.external.given_commands import giving
 from surgsim.control.problem import VelocityProblem
 from surgsim.control.torque_laws.base import TorqueProblem
 from surgsim.errors import Outcome

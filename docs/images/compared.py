@@ -4,7 +4,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-from surgsim.compare.wording import exactly, heading_of
+from surgsim.compare.figure_text import exactly, heading_of
 from surgsim.metrics.catalog import METRICS
 from surgsim.metrics.metric import Source
 

@@ -12,7 +12,7 @@ from surgsim.cli.scenario_options import naming_file
 from surgsim.control.controller import ControllerConfig
 from surgsim.errors import UnreachableError
 from surgsim.runs.folder import execute, run_to_folder, summary_of_result
-from surgsim.runs.parts import check_parts
+from surgsim.runs.part_origins import check_parts
 from surgsim.scenario.arms import Experiment
 from surgsim.scenario.externals import externals_given
 from surgsim.scenario.load import Source, load_experiment

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from surgsim.errors import SurgsimError, unknown_name
-from surgsim.runs.parts import missing_package
+from surgsim.runs.part_origins import missing_package
 from surgsim.scenario.arms import Experiment, each_arm
 from surgsim.scenario.load import load_experiment, load_scenario, shipped
 from surgsim.scenario.schema import Scenario

@@ -27,7 +27,7 @@ def execute(options: argparse.Namespace) -> int:
     from surgsim.cli.main import print_error
     from surgsim.cli.table import print_text
     from surgsim.errors import SurgsimError
-    from surgsim.runs.parts import check_parts
+    from surgsim.runs.part_origins import check_parts
     from surgsim.scenario.load import load_experiment
     from surgsim.scenario.yaml_text import dump_yaml
     from surgsim.simulate.loop import prepared

@@ -131,7 +131,7 @@ Job = tuple[Path, Callable[[Path, Sequence["Subject"]], None]]
 def _jobs(options: argparse.Namespace) -> list[Job]:
     """What is to be written, each file checked."""
     from surgsim.export import data, figure, table
-    from surgsim.export.written import check_target
+    from surgsim.export.target import check_target
 
     jobs: list[Job] = []
     for path in options.data:
@@ -167,8 +167,8 @@ def _video_job(path: Path, options: argparse.Namespace) -> Callable[[Path, Seque
     from surgsim.cli.output import show_count
     from surgsim.errors import SurgsimError
     from surgsim.export.moving import SUFFIXES, check_encoder
+    from surgsim.export.target import check_target
     from surgsim.export.video import VideoSettings, parse_size, write_video
-    from surgsim.export.written import check_target
 
     check_target("--video", path, SUFFIXES, force=options.force)
     if path.suffix.lower() == ".mp4":

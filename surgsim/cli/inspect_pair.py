@@ -27,8 +27,8 @@ def inspect_two(paths: list[Path], options: argparse.Namespace) -> int:
     from surgsim.cli.table import print_prose
     from surgsim.errors import SurgsimError
     from surgsim.recording import view
-    from surgsim.recording.pair import write_pair
     from surgsim.recording.read import read_recording
+    from surgsim.recording.side_by_side import write_pair
 
     if options.export:
         raise SurgsimError("--export takes one recording")

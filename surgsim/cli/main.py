@@ -84,7 +84,7 @@ def print_error(error: SurgsimError) -> None:
 
     A terminal breaks it between words.
     """
-    from surgsim.scenario.wording import one_line
+    from surgsim.scenario.messages import one_line
 
     print_prose(f"surgsim: {one_line(str(error), _LONGEST_ERROR)}", sys.stderr)
 

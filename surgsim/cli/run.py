@@ -62,7 +62,7 @@ def execute(options: argparse.Namespace) -> int:
     from surgsim.errors import Outcome, SurgsimError, UnreachableError
     from surgsim.packages import RECORDING, require
     from surgsim.runs.folder import check_recordable, run_to_folder
-    from surgsim.runs.parts import check_parts
+    from surgsim.runs.part_origins import check_parts
     from surgsim.scenario.load import load_experiment
 
     if options.live is not None and options.operator is not None:

@@ -50,7 +50,7 @@ def externals_given(options: argparse.Namespace) -> Iterator[None]:
     if texts is None:  # a command that runs none
         yield
         return
-    from surgsim.control.external.given import parse_given
+    from surgsim.control.external.given_commands import parse_given
     from surgsim.scenario.externals import externals_given as given
 
     with given(parse_given(texts)):

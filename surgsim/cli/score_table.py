@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
 def print_score(score: "Score", protocol: "ProtocolConfig") -> None:
     """Print the sentence, the scorecard and the axes."""
-    from surgsim.protocol.wording import axis_told, figure_told, sentence, timing_told, tuning_told
+    from surgsim.protocol.score_text import axis_told, figure_told, sentence, timing_told, tuning_told
 
     card = score.scorecard
     for line in sentence(score):

@@ -150,7 +150,7 @@ def _print(tuning: "Tuning") -> None:
 
 
 def _shown(value: "float | tuple[float, ...]") -> str:
-    from surgsim.scenario.wording import show
+    from surgsim.scenario.messages import show
 
     return show(list(value) if isinstance(value, tuple) else value, 200)
 

@@ -22,7 +22,7 @@ from surgsim.recording.folders import make_folder
 from surgsim.recording.sealed import read_sealed, sealed
 from surgsim.runs.drafts import clear_drafts
 from surgsim.runs.exchange import restore_all
-from surgsim.runs.parts import check_parts
+from surgsim.runs.part_origins import check_parts
 from surgsim.runs.provenance import code_difference, provenance, provenance_of
 from surgsim.scenario.arms import Experiment
 

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from surgsim.compare.figure_text import counted, heading_of, listed, with_unit
 from surgsim.compare.observations import Mask, Observations
-from surgsim.compare.wording import counted, heading_of, listed, with_unit
 from surgsim.metrics.accuracy import CONVERGED_RCM_M
 from surgsim.metrics.catalog import METRICS
 

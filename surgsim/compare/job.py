@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from surgsim.compare.columns import Table
-from surgsim.control.external.given import given, giving
+from surgsim.control.external.given_commands import given, giving
 from surgsim.errors import Outcome, SurgsimError
 from surgsim.runs.folder import execute, summary_of, whole_folder, write_run, write_summary
 from surgsim.scenario.arms import Experiment, experiment_of

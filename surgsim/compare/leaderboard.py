@@ -11,7 +11,7 @@ from surgsim.compare.columns import Table
 from surgsim.compare.failures import counted_outcomes
 from surgsim.compare.intervals import Interval
 from surgsim.compare.observations import COMPLETED, Observations, metric_named
-from surgsim.compare.places import places_of
+from surgsim.compare.ranking import places_of
 
 _RESAMPLES = 1000
 

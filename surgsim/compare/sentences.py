@@ -1,9 +1,9 @@
 """The finding of a comparison in words, with its figures."""
 
+from surgsim.compare.figure_text import bracket, counted, exactly, heading_of, with_unit
 from surgsim.compare.intervals import Interval
-from surgsim.compare.pairs import Pairs
+from surgsim.compare.paired_runs import Pairs
 from surgsim.compare.verdict import Verdict
-from surgsim.compare.wording import bracket, counted, exactly, heading_of, with_unit
 from surgsim.metrics.metric import Metric
 
 

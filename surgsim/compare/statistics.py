@@ -20,7 +20,7 @@ from surgsim.compare.intervals import (
     proportion_interval,
 )
 from surgsim.compare.observations import Observations, metric_named
-from surgsim.compare.pairs import Pairs, pair_runs
+from surgsim.compare.paired_runs import Pairs, pair_runs
 from surgsim.compare.sentences import sentence_of
 from surgsim.compare.verdict import Verdict, verdict_of
 from surgsim.metrics.metric import Metric

@@ -4,12 +4,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from surgsim.compare.failures import Failing, failing
+from surgsim.compare.figure_text import exactly, heading_of, listed, number, seeds_of, with_unit
 from surgsim.compare.leaderboard import LeaderboardRow
 from surgsim.compare.observations import Observations, metric_named
 from surgsim.compare.sentences import side
 from surgsim.compare.statistics import Comparison, chance_of_failures, compare_pair
 from surgsim.compare.verdict import Verdict
-from surgsim.compare.wording import exactly, heading_of, listed, number, seeds_of, with_unit
 from surgsim.metrics.metric import Metric
 
 

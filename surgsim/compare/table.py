@@ -17,7 +17,7 @@ from surgsim.packages import installed
 from surgsim.recording.files import replacing, write_file
 from surgsim.recording.sealed import read_sealed
 from surgsim.runs.folder import SCHEMA_VERSION
-from surgsim.scenario.wording import one_line
+from surgsim.scenario.messages import one_line
 
 TEXT_COLUMNS = ("run_id", "suite", "scenario", "controller")
 PARQUET = "runs.parquet"

@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from surgsim.compare.wording import heading_of
+from surgsim.compare.figure_text import heading_of
 from surgsim.errors import SurgsimError
 from surgsim.export.columns import ENCODERS, Column
 from surgsim.export.subjects import BatchSubject, RunSubject, StudySubject, Subject
-from surgsim.export.written import write_whole
+from surgsim.export.target import write_whole
 from surgsim.metrics.catalog import METRICS
 from surgsim.recording.export import export
 from surgsim.studies.tables import Row

@@ -10,7 +10,7 @@ from surgsim.array import Array
 from surgsim.compare.leaderboard import leaderboard
 from surgsim.compare.observations import Observations
 from surgsim.errors import SurgsimError
-from surgsim.export.names import told_apart
+from surgsim.export.labels import told_apart
 from surgsim.export.paper_style import (
     LOGARITHMIC,
     SUFFIXES,
@@ -22,7 +22,7 @@ from surgsim.export.paper_style import (
 )
 from surgsim.export.study_figure import study_figure
 from surgsim.export.subjects import BatchSubject, RunSubject, StudySubject, Subject, arm_by_arm, check_metrics
-from surgsim.export.written import write_whole
+from surgsim.export.target import write_whole
 from surgsim.metrics.catalog import METRICS
 from surgsim.recording.polyline import drawn_rows
 

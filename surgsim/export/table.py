@@ -5,14 +5,14 @@ from pathlib import Path
 
 import numpy as np
 
+from surgsim.compare.figure_text import bracket, heading_of, number
 from surgsim.compare.leaderboard import LeaderboardRow, leaderboard
 from surgsim.compare.observations import Observations
-from surgsim.compare.wording import bracket, heading_of, number
 from surgsim.errors import SurgsimError, unknown_name
 from surgsim.export.paper_table import WRITERS, PaperColumn, PaperTable
 from surgsim.export.study_figure import keys_of
 from surgsim.export.subjects import BatchSubject, RunSubject, StudySubject, Subject, arm_by_arm, check_metrics
-from surgsim.export.written import write_whole
+from surgsim.export.target import write_whole
 from surgsim.metrics.catalog import METRICS
 from surgsim.studies.tables import Cell, format_cell
 

@@ -10,8 +10,8 @@ import numpy as np
 
 from surgsim.array import Array
 from surgsim.errors import SurgsimError
+from surgsim.export.labels import told_apart
 from surgsim.export.moving import SUFFIXES, film, period_of
-from surgsim.export.names import told_apart
 from surgsim.export.overlay import figures, written
 from surgsim.export.replayed import Replayed, replayed
 from surgsim.export.subjects import RunSubject, Subject

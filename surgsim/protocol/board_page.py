@@ -8,9 +8,9 @@ from pathlib import Path
 from surgsim.errors import SurgsimError
 from surgsim.protocol.definition import Protocol
 from surgsim.protocol.passport_page import document
-from surgsim.protocol.places import ordered, place_of
+from surgsim.protocol.ranking import ordered, place_of
 from surgsim.protocol.score import Score
-from surgsim.protocol.wording import figure_told, timing_told, tuning_told
+from surgsim.protocol.score_text import figure_told, timing_told, tuning_told
 from surgsim.recording.files import replacing, write_file
 from surgsim.recording.folders import make_folder
 from surgsim.report import html

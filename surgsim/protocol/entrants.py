@@ -9,13 +9,13 @@ from pathlib import Path
 from typing import Any
 
 from surgsim.control.controller import ControllerConfig
-from surgsim.control.external.given import given
+from surgsim.control.external.given_commands import given
 from surgsim.control.policies.registry import policy_names
 from surgsim.errors import ScenarioError, SurgsimError, unknown_name
 from surgsim.packages import MissingPackageError
 from surgsim.protocol.canonical import sha256_of
 from surgsim.protocol.definition import Protocol, TrackConfig, entry_file, entry_label, with_scheme
-from surgsim.runs.parts import external_names, missing_package
+from surgsim.runs.part_origins import external_names, missing_package
 from surgsim.scenario.hashed import hashed
 from surgsim.scenario.load import find, load_controller, shipped
 

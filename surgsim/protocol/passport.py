@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 from surgsim.export.paper_style import colours, new_figure
 from surgsim.protocol.definition import ProtocolConfig
 from surgsim.protocol.score import Score
-from surgsim.protocol.wording import figure_told, sentence, timing_told, tuning_told
+from surgsim.protocol.score_text import figure_told, sentence, timing_told, tuning_told
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -6,7 +6,7 @@ from typing import Any
 
 from surgsim.protocol.definition import ProtocolConfig
 from surgsim.protocol.score import Score
-from surgsim.protocol.wording import axis_told, figure_told, sentence, timing_told, tuning_told
+from surgsim.protocol.score_text import axis_told, figure_told, sentence, timing_told, tuning_told
 from surgsim.report import html
 
 MARKS = ("●", "■", "▲", "◆", "▼", "✚", "✖", "★")

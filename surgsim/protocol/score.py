@@ -24,7 +24,7 @@ from surgsim.protocol.scorecard import scorecard
 from surgsim.protocol.seeds import Seeds
 from surgsim.recording.files import replacing, write_file
 from surgsim.recording.folders import make_folder
-from surgsim.runs.parts import check_parts
+from surgsim.runs.part_origins import check_parts
 from surgsim.runs.provenance import provenance
 
 SCHEMA_VERSION = 1

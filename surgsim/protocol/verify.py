@@ -24,7 +24,7 @@ from surgsim.protocol.checks import (
 )
 from surgsim.protocol.definition import Protocol
 from surgsim.protocol.findings import Finding
-from surgsim.protocol.here import check_code, platform_differences
+from surgsim.protocol.installation import check_code, platform_differences
 from surgsim.protocol.rows import Row, row_of
 from surgsim.protocol.runs import Report, Runner, Store, run_cells
 

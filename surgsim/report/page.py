@@ -7,11 +7,11 @@ from pathlib import Path
 from surgsim.report import html
 from surgsim.report.results import Results
 from surgsim.report.scenes import SceneView
+from surgsim.report.sections.comparisons import pairs_section
 from surgsim.report.sections.gain_maps import maps_section
 from surgsim.report.sections.header import header
 from surgsim.report.sections.leaderboard import boards_of, failures_section, leaderboard_section
 from surgsim.report.sections.methods import methods_section, versions_section
-from surgsim.report.sections.pairs import pairs_section
 from surgsim.report.sections.ranking import ranking_section
 from surgsim.report.sections.robustness import robustness_section
 from surgsim.report.sections.runs import runs_section

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import surgsim
-from surgsim.runs.parts import externals_of, plugins_of, policies_of
+from surgsim.runs.part_origins import externals_of, plugins_of, policies_of
 from surgsim.runs.sources import LATER_ROOMS, ROOT, sources_sha256
 from surgsim.scenario.arms import Experiment
 

@@ -9,7 +9,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 
-from surgsim.control.external.given import asking_for, giving, parse_given
+from surgsim.control.external.given_commands import asking_for, giving, parse_given
 from surgsim.errors import SurgsimError
 from surgsim.scenario.yaml_text import read_yaml
 
@@ -18,7 +18,7 @@ from surgsim.scenario.yaml_text import read_yaml
 def externals_given(commands: Mapping[str, str]) -> Iterator[None]:
     """Within the block, external controllers have these commands, and others those of the user's own file.
 
-    Runs that name none of these are refused by `surgsim.runs.parts.check_parts`.
+    Runs that name none of these are refused by `surgsim.runs.part_origins.check_parts`.
 
     Raises:
         SurgsimError: If a name is none, or that file is not right.

@@ -36,6 +36,10 @@ def hashed(config: BaseModel) -> dict[str, Any]:
     return data
 
 
+def _same(one: object, other: object) -> bool:
+    return type(one) is type(other) and one == other
+
+
 def _mappings(data: object) -> list[dict[str, Any]]:
     return [each for each in data if isinstance(each, dict)] if isinstance(data, list) else []
 
@@ -45,7 +49,7 @@ def _leave_out(value: object, data: object) -> None:
     if isinstance(value, BaseModel) and isinstance(data, dict):
         for name, info in type(value).model_fields.items():
             own = getattr(value, name)
-            if ADDED in info.metadata and own == info.get_default(call_default_factory=True):
+            if ADDED in info.metadata and _same(own, info.get_default(call_default_factory=True)):
                 data.pop(name, None)
             else:
                 _leave_out(own, data.get(name))

@@ -15,10 +15,10 @@ from surgsim.resources import resource_dir
 from surgsim.scenario.arms import NOT_BESIDE_ARMS, ArmsScenario, Experiment
 from surgsim.scenario.drawn import drawn_document
 from surgsim.scenario.files import files_in
+from surgsim.scenario.messages import one_line, show_with_kind
 from surgsim.scenario.plain import document_of
 from surgsim.scenario.schema import Scenario
 from surgsim.scenario.validate import validate
-from surgsim.scenario.wording import one_line, show_with_kind
 from surgsim.scenario.yaml_events import KeyPath
 from surgsim.scenario.yaml_text import YamlDocument, read_yaml, set_value
 

@@ -10,7 +10,7 @@ from pydantic_core import PydanticCustomError
 from surgsim.errors import SurgsimError
 from surgsim.models.config import ForEachJoint, RobotConfig
 from surgsim.models.robot import robot_joints
-from surgsim.scenario.wording import show, unwrap
+from surgsim.scenario.messages import show, unwrap
 from surgsim.scenario.yaml_events import KeyPath
 
 

@@ -8,7 +8,7 @@ from typing import Any
 
 from surgsim.catalog import PartConfig
 from surgsim.errors import ScenarioError
-from surgsim.scenario.wording import dotted, one_line
+from surgsim.scenario.messages import dotted, one_line
 from surgsim.scenario.yaml_events import MAX_DEPTH, KeyPath
 from surgsim.scenario.yaml_text import YamlDocument
 

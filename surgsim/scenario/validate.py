@@ -16,7 +16,7 @@ from pydantic import ValidationError
 from surgsim.catalog import PartConfig
 from surgsim.errors import ScenarioError, unknown_name
 from surgsim.scenario.magnitudes import check_magnitudes
-from surgsim.scenario.wording import Shape, one_line, show, show_with_kind, unwrap
+from surgsim.scenario.messages import Shape, one_line, show, show_with_kind, unwrap
 from surgsim.scenario.yaml_events import KeyPath
 from surgsim.scenario.yaml_text import YamlDocument
 

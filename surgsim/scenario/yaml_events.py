@@ -14,7 +14,7 @@ from ruamel.yaml import YAML
 from ruamel.yaml.error import MarkedYAMLError, YAMLError
 
 from surgsim.errors import ScenarioError
-from surgsim.scenario.wording import dotted, one_line, show
+from surgsim.scenario.messages import dotted, one_line, show
 
 KeyPath = tuple[str | int, ...]
 

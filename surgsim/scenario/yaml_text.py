@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from surgsim.errors import ScenarioError
-from surgsim.scenario.wording import dotted, one_line, show, show_with_kind
+from surgsim.scenario.messages import dotted, one_line, show, show_with_kind
 from surgsim.scenario.yaml_events import MAX_BYTES, MAX_DEPTH, KeyPath, TreeBuilder, locate
 
 _PLAIN = re.compile(r"[A-Za-z_/][A-Za-z0-9_./-]*( [A-Za-z0-9_./()-]+)*")

@@ -13,7 +13,7 @@ from surgsim.catalog import PartConfig
 from surgsim.control.controller import ControllerConfig
 from surgsim.errors import SurgsimError, unknown_name
 from surgsim.scenario.load import load_controller
-from surgsim.scenario.wording import Shape, unwrap
+from surgsim.scenario.messages import Shape, unwrap
 
 RANGE = 30.0
 """Largest factor on a gain's first value, either way."""

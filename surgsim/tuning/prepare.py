@@ -6,7 +6,7 @@ from surgsim.catalog import check_name
 from surgsim.compare.suite import parse_seeds
 from surgsim.errors import ScenarioError, SurgsimError
 from surgsim.models.robot import robot_joints
-from surgsim.runs.parts import check_parts
+from surgsim.runs.part_origins import check_parts
 from surgsim.scenario.arms import Experiment, each_arm
 from surgsim.scenario.load import load_controller, load_experiment
 from surgsim.tuning.gains import gains_of

@@ -17,10 +17,10 @@ from surgsim.compare.table import Row, read_rows
 from surgsim.export.overlay import figures
 from surgsim.metrics.catalog import METRICS, evaluate, of_one_arm
 from surgsim.recording.blueprint import blueprint
-from surgsim.recording.pair import _blueprint
 from surgsim.recording.read import read_recording
 from surgsim.recording.replay import Replay
 from surgsim.recording.scene import rebuild_all, scenario_of
+from surgsim.recording.side_by_side import _blueprint
 from surgsim.report import scene_process
 from surgsim.report.series import read_series
 from surgsim.scenario.load import load_experiment

@@ -9,7 +9,7 @@ import pytest
 from surgsim.compare.aggregates import ranks, scores
 from surgsim.compare.leaderboard import leaderboard
 from surgsim.compare.matters import checked_matters, parse_matters
-from surgsim.compare.places import places_of
+from surgsim.compare.ranking import places_of
 from surgsim.compare.statistics import chance_of_failures, compare_pair
 from surgsim.compare.suite import SuiteConfig, with_changes
 from surgsim.compare.summary import summary

@@ -13,9 +13,9 @@ from surgsim.compare.engine import Batch, compare
 from surgsim.compare.job import Job
 from surgsim.compare.suite import SuiteConfig
 from surgsim.compare.workers import run_jobs
-from surgsim.control.external.given import giving
+from surgsim.control.external.given_commands import giving
 from surgsim.errors import SurgsimError
-from surgsim.runs.parts import externals_of
+from surgsim.runs.part_origins import externals_of
 from surgsim.scenario.load import load_scenario
 
 

@@ -12,8 +12,8 @@ from typing import Any
 
 import pytest
 
+from surgsim.scenario.messages import Shape, dotted, unwrap
 from surgsim.scenario.schema import Scenario
-from surgsim.scenario.wording import Shape, dotted, unwrap
 from surgsim.scenario.yaml_text import dump_yaml
 
 Path = tuple[str | int, ...]

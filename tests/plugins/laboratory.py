@@ -21,7 +21,7 @@ from surgsim.protocol.runs import Store
 from surgsim.protocol.score import Means, Wish, score, write_score
 from surgsim.protocol.seeds import seeds_of
 from surgsim.protocol.submit import submission
-from surgsim.runs import parts
+from surgsim.runs import part_origins
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = ROOT / "docs" / "submission.md"
@@ -61,10 +61,10 @@ def installed(site: Path) -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
         patch.syspath_prepend(site)
         all_offers.cache_clear()
-        parts._told.cache_clear()
+        part_origins._told.cache_clear()
         yield
     all_offers.cache_clear()
-    parts._told.cache_clear()
+    part_origins._told.cache_clear()
     for name in [name for name in sys.modules if name.partition(".")[0] == "lab_controller"]:
         del sys.modules[name]
 

@@ -231,7 +231,7 @@ def test_on_another_platform_numbers_may_differ_by_the_tolerance_and_nothing_els
 
 
 def test_another_platform_is_told_and_takes_the_tolerance(at_the_laboratory, monkeypatch):
-    monkeypatch.setattr("surgsim.protocol.here.cpu", lambda: "another")
+    monkeypatch.setattr("surgsim.protocol.installation.cpu", lambda: "another")
     bundle = bundle_of(at_the_laboratory.files, "b.zip")
     altered = [replace(row, metrics={**row.metrics, "tip_error_rms_mm": 3.0}) for row in bundle.rows]
     value = bundle.rows[0].metrics["tip_error_rms_mm"]

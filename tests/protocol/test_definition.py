@@ -3,7 +3,7 @@
 import pytest
 from tiny_protocol import TINY, write_protocol
 
-from surgsim.control.external.given import giving
+from surgsim.control.external.given_commands import giving
 from surgsim.errors import ScenarioError, SurgsimError
 from surgsim.protocol import items
 from surgsim.protocol.cells import cells, scenario_tree

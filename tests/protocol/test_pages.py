@@ -11,11 +11,11 @@ from tiny_protocol import Here
 from surgsim.protocol.board import Board, make_board
 from surgsim.protocol.passport_files import write_passport
 from surgsim.protocol.passport_page import passport_page
-from surgsim.protocol.places import ordered, place_of
+from surgsim.protocol.ranking import ordered, place_of
 from surgsim.protocol.reading import baselines_of, scores_below, why_none_beside
 from surgsim.protocol.score import FILES, Means
+from surgsim.protocol.score_text import axis_told, figure_told, sentence, tuning_told
 from surgsim.protocol.seeds import Seeds
-from surgsim.protocol.wording import axis_told, figure_told, sentence, tuning_told
 
 
 @contextmanager

@@ -147,7 +147,7 @@ def test_metrics_that_do_not_apply_are_left_out(trace: Trace) -> None:
 
 
 def test_two_runs_side_by_side_share_their_axes(trace: Trace) -> None:
-    from surgsim.recording.pair import common_axis
+    from surgsim.recording.side_by_side import common_axis
 
     axis = common_axis([np.array([0.0, 1.0, np.nan]), np.array([np.inf, 3.0])])
     assert_allclose(axis.range.as_arrow_array().to_pylist()[0], [-0.15, 3.15])

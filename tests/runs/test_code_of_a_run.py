@@ -10,7 +10,7 @@ import pytest
 import surgsim
 from surgsim.control.policies.registry import offering
 from surgsim.plugins import all_offers
-from surgsim.runs import parts, sources
+from surgsim.runs import part_origins, sources
 from surgsim.runs.provenance import code_difference, provenance_of
 
 ROOT = Path(surgsim.__file__).parents[1]
@@ -81,7 +81,7 @@ def policy_package(tmp_path, monkeypatch):
     all_offers.cache_clear()
     for name in [name for name in sys.modules if name.partition(".")[0] == "some_policies"]:
         del sys.modules[name]
-    parts._told.cache_clear()
+    part_origins._told.cache_clear()
 
 
 def test_a_package_that_gave_a_part_is_told_with_version_and_hash_and_a_policy_with_its_file(
@@ -92,7 +92,7 @@ def test_a_package_that_gave_a_part_is_told_with_version_and_hash_and_a_policy_w
     first = provenance_of(mine)
     assert first["plugins"]["some_policies"]["version"] == "1.5"
     assert set(first["policies"]) == {"mine"}
-    parts._told.cache_clear()
+    part_origins._told.cache_clear()
     (policy_package / "weights.bin").write_bytes(b"2")
     second = provenance_of(mine)
     assert second["code_sha256"] != first["code_sha256"]

@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 from surgsim.errors import ScenarioError, SurgsimError
 from surgsim.scenario.load import load_scenario
 from surgsim.scenario.magnitudes import UNITS, unit_of
+from surgsim.scenario.messages import unwrap
 from surgsim.scenario.schema import Scenario
 from surgsim.scenario.validate import validate
-from surgsim.scenario.wording import unwrap
 from surgsim.scenario.yaml_text import dump_yaml, parse_yaml
 from surgsim.simulate.setup import prepare
 

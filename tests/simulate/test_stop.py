@@ -7,7 +7,7 @@ import outside
 import pytest
 
 from surgsim.cli.main import main
-from surgsim.control.external.given import giving
+from surgsim.control.external.given_commands import giving
 from surgsim.control.failure import ControlFailure
 from surgsim.errors import Outcome
 from surgsim.metrics.catalog import compute_metrics

@@ -26,7 +26,7 @@ import numpy as np
 import outside
 from surgsim.contract.arms import arm_of, cases, scenes
 from surgsim.contract.problems import torque_problem, velocity_problem
-from surgsim.control.external.given import giving
+from surgsim.control.external.given_commands import giving
 from surgsim.control.failure import ControlFailure
 from surgsim.control.port_estimators import PORT_ESTIMATORS
 from surgsim.control.resolvers import RESOLVERS

@@ -10,7 +10,7 @@ from surgsim.control.external import exchange
 from surgsim.control.external.command import Function, read_command
 from surgsim.control.external.declared import remember
 from surgsim.control.external.exchange import CLOSED, OWN_MEMORY, POST_SIZE, Post
-from surgsim.control.external.given import command_for
+from surgsim.control.external.given_commands import command_for
 from surgsim.control.external.greeting import greeting
 from surgsim.control.external.layout import JOINT_VELOCITY, REQUEST, reply, request, runs
 from surgsim.control.external.library import Library

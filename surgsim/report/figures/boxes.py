@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from surgsim.array import Array
-from surgsim.compare.wording import number
+from surgsim.compare.figure_text import number
 from surgsim.report.figures.scale import Scale
 from surgsim.report.figures.svg import WIDTH, Drawing, colour, fmt, shortened
 

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surgsim.array import Array
-from surgsim.compare.wording import number
+from surgsim.compare.figure_text import number
 from surgsim.report.figures.scale import Scale
 from surgsim.report.figures.svg import WIDTH, Drawing, cross, fmt
 from surgsim.report.figures.ticks import tick_text

@@ -2,8 +2,8 @@
 
 from collections.abc import Sequence
 
+from surgsim.compare.figure_text import bracket, number
 from surgsim.compare.intervals import Interval
-from surgsim.compare.wording import bracket, number
 from surgsim.report.figures.scale import Scale
 from surgsim.report.figures.svg import WIDTH, Drawing, colour, fmt, mark, shortened
 

@@ -3,9 +3,9 @@
 from collections.abc import Mapping, Sequence
 
 from surgsim.compare.failures import counted_outcomes, outcome_words
+from surgsim.compare.figure_text import bracket, number
 from surgsim.compare.intervals import Interval
 from surgsim.compare.leaderboard import LeaderboardRow, leaderboard
-from surgsim.compare.wording import bracket, number
 from surgsim.metrics.catalog import METRICS
 from surgsim.report import html
 from surgsim.report.results import Results

@@ -5,8 +5,8 @@ from pathlib import Path
 from string import Template
 from typing import Any
 
+from surgsim.compare.figure_text import exactly, heading_of
 from surgsim.compare.intervals import FEWEST, RESAMPLES
-from surgsim.compare.wording import exactly, heading_of
 from surgsim.metrics.catalog import METRICS
 from surgsim.metrics.metric import Metric
 from surgsim.report import html

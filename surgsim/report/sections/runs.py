@@ -5,8 +5,8 @@ from pathlib import Path
 from typing import Any
 
 from surgsim.compare.failures import outcome_words
+from surgsim.compare.figure_text import number
 from surgsim.compare.observations import COMPLETED
-from surgsim.compare.wording import number
 from surgsim.metrics.catalog import METRICS
 from surgsim.report import html
 from surgsim.report.results import Results, parameters_of

@@ -4,16 +4,16 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from surgsim.compare.figure_text import number
 from surgsim.compare.observations import Observations
-from surgsim.compare.wording import number
 from surgsim.display import count
 from surgsim.metrics.catalog import METRICS
 from surgsim.report import html
 from surgsim.report.figures.boxes import MOST_POINTS, Group, box_plot
 from surgsim.report.figures.curves import Curve, curve_plot
 from surgsim.report.results import Results, parameters_of
+from surgsim.report.sections.comparisons import comparison_table
 from surgsim.report.sections.frontier import frontiers
-from surgsim.report.sections.pairs import comparison_table
 from surgsim.report.series import COLUMNS, Series
 
 _ABREAST = 8

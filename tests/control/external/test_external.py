@@ -13,7 +13,7 @@ import outside
 import pytest
 from batches import short_run
 
-from surgsim.control.external.given import giving
+from surgsim.control.external.given_commands import giving
 from surgsim.errors import Outcome, SurgsimError
 from surgsim.scenario.load import load_scenario
 from surgsim.simulate.loop import Simulation, simulate

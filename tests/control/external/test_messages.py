@@ -16,7 +16,7 @@ import pytest
 from surgsim.cli.main import main
 from surgsim.control.external.command import Function, Program, read_command
 from surgsim.control.external.exchange import exchange
-from surgsim.control.external.given import command_for, given, giving, parse_given
+from surgsim.control.external.given_commands import command_for, given, giving, parse_given
 from surgsim.control.external.layout import JOINT_VELOCITY, layout_hash, request, runs
 from surgsim.control.external.outside import Outside
 from surgsim.control.external.texts import header_text, layout_json

@@ -11,7 +11,7 @@ from pydantic import BaseModel
 
 from surgsim.catalog import PartConfig
 from surgsim.control.external.declared import last_declared
-from surgsim.control.external.given import check_named, command_for
+from surgsim.control.external.given_commands import check_named, command_for
 from surgsim.control.policies.registry import find_policy
 from surgsim.control.resolvers.external import ExternalConfig
 from surgsim.control.resolvers.policy import PolicyConfig

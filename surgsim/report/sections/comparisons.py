@@ -2,10 +2,10 @@
 
 from collections.abc import Sequence
 
+from surgsim.compare.figure_text import bracket, counted, exactly, heading_of, number, seeds_of
 from surgsim.compare.intervals import Interval
 from surgsim.compare.statistics import Comparison, compare_all, compare_pair
 from surgsim.compare.verdict import Verdict
-from surgsim.compare.wording import bracket, counted, exactly, heading_of, number, seeds_of
 from surgsim.metrics.catalog import METRICS
 from surgsim.report import html
 from surgsim.report.results import Results

@@ -7,7 +7,7 @@ from surgsim.protocol.checks import Asked
 from surgsim.protocol.entrants import program_hashes
 from surgsim.protocol.findings import Finding, differences
 from surgsim.protocol.runs import compilers, cpu
-from surgsim.runs.parts import externals_of, plugins_of, policies_of
+from surgsim.runs.part_origins import externals_of, plugins_of, policies_of
 from surgsim.runs.provenance import provenance
 from surgsim.runs.sources import source_hashes
 
