@@ -53,6 +53,8 @@ pages_below = {
     "docs/submission": "../examples/container/README",
 }
 
+lazy_pages = ["docs/gallery"]
+
 extensions = [
     "myst_nb",
     "sphinx.ext.autodoc",
@@ -61,6 +63,7 @@ extensions = [
     "repository_files",
     "from_code",
     "recorded_run",
+    "lazy_pictures",
 ]
 myst_enable_extensions = ["dollarmath"]
 myst_heading_anchors = 4

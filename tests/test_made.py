@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from surgsim.api.available import available
 from surgsim.compare.table import read_table
 from surgsim.scenario.load import shipped
 
@@ -23,6 +24,12 @@ def made():
         yield importlib.import_module("draw"), importlib.import_module("tables")
     finally:
         sys.path.pop(0)
+
+
+@pytest.fixture
+def runs(made):
+    """The script that runs the scenarios of the gallery."""
+    return importlib.import_module("gallery_runs")
 
 
 def stamped(path):
@@ -88,7 +95,7 @@ def test_the_pictures_are_those_of_the_current_scenes(made, file):
 def test_the_moving_pictures_are_of_the_current_scenes(made):
     draw, _ = made
     for file in draw.MOVING:
-        assert draw.moving_stamp(file).encode() in (draw.HERE / file).read_bytes(), AGAIN
+        assert stamped(draw.HERE / file) == draw.moving_stamp(file), AGAIN
 
 
 def test_the_picture_of_the_theatres_errors_is_that_of_the_results(made):
@@ -107,6 +114,87 @@ def test_the_gallery_shows_the_current_scenarios(made):
     text = gallery.PAGE.read_text(encoding="utf-8")
     assert text == gallery.page(), AGAIN
     assert [name for name in shipped() if f"surgsim run {name}" not in text] == []
+
+
+def test_every_scenario_of_the_gallery_has_picture_and_result_of_what_it_is_now(runs):
+    assert runs.out_of_date() == [], AGAIN
+    every = available("scenarios")
+    assert list(runs.results()) == list(every)
+    assert set(runs.HERE.glob("*.gif")) == {runs.picture(name) for name in every}
+    assert sum(file.stat().st_size for file in runs.HERE.glob("*.gif")) < 4_000_000
+
+
+def test_a_result_or_a_picture_of_another_scenario_is_found(runs, monkeypatch, tmp_path):
+    held = runs.results()
+    held["circle_panda"] = {**held["circle_panda"], "stamp": held["circle_fr3"]["stamp"]}
+    monkeypatch.setattr(runs, "results", lambda: held)
+    assert runs.out_of_date() == ["circle_panda"]
+    del held["circle_panda"]
+    assert runs.out_of_date() == ["circle_panda"]
+    pictures = {"circle_fr3": tmp_path / "none.gif", "spiral_panda": runs.picture("spiral_lwr4plus")}
+    usual = runs.picture
+    monkeypatch.setattr(runs, "picture", lambda name: pictures.get(name) or usual(name))
+    assert set(runs.out_of_date()) == {"circle_panda", "circle_fr3", "spiral_panda"}
+
+
+def test_a_stamp_is_of_scenario_cameras_and_the_assets_of_its_own_arms(runs, monkeypatch):
+    before = {name: runs.stamp(name) for name in ("circle_panda", "circle_fr3", "two_ports_panda")}
+    assert len(set(before.values())) == 3
+
+    def changed():
+        return {name for name, told in before.items() if runs.stamp(name) != told}
+
+    monkeypatch.setitem(runs.CAMERAS, "circle_fr3", ("overview", "endoscope"))
+    assert changed() == {"circle_fr3"}
+    usual = runs._assets()
+    other = [(parts, told + "x" * ("panda" in parts)) for parts, told in usual]
+    monkeypatch.setattr(runs, "_assets", lambda: other)
+    assert changed() == set(before)
+    monkeypatch.delitem(runs.CAMERAS, "circle_fr3")
+    assert changed() == {"circle_panda", "two_ports_panda"}
+
+
+@pytest.mark.parametrize("name", ["breathing_tracked_panda", "safety/tip_limit", "teleop_free_motion_panda"])
+def test_a_result_of_the_gallery_is_what_the_run_gives(runs, name):
+    told, found = runs.results()[name], runs.result(runs.run(name))
+    assert found.pop("figures") == pytest.approx(told.pop("figures"), rel=1e-3, abs=1e-6)
+    assert {"stamp": told["stamp"], **found} == told
+
+
+def test_a_scenario_that_ends_early_is_shown_with_what_ends_it(runs):
+    held = runs.results()
+    early = [name for name in held if name.startswith("safety/")]
+    assert [held[name]["outcome"] for name in early] == [name.removeprefix("safety/") for name in early]
+    assert all(held[name]["outcome"] == "completed" for name in set(held) - set(early))
+
+
+def test_a_result_in_words(made):
+    gallery = importlib.import_module("gallery")
+    found = {
+        "outcome": "completed",
+        "t_s": 11.0,
+        "detail": "",
+        "success": True,
+        "reason": "the path was followed",
+        "exceeded": [],
+        "figures": {"rcm_error_max_mm": 1.2345, "tip_error_max_mm": 0.0004},
+    }
+    path = "**Done** in 11 s: the path was followed"
+    assert gallery.result(found) == f"{path}. RCM max 1.23 mm, tip max below 0.001 mm."
+    past = {**found, "exceeded": ["`rcm_error_max_mm` 5.69 exceeds 5"], "figures": {}}
+    assert gallery.result(past) == f"{path}, but `rcm_error_max_mm` 5.69 exceeds 5."
+    assert gallery.result({**past, "success": False, "reason": "2 of 3"}) == "**Not done** in 11 s: 2 of 3."
+    figures = {"delivered_excess_j": 0.25, "rings_transferred": 2.0}
+    assert gallery.result({**found, "figures": figures}).endswith(
+        ". 2 rings transferred, not passive: 0.25 J more than was stored."
+    )
+    assert gallery.result({**found, "figures": {"delivered_excess_j": -0.1}}).endswith(". passive.")
+    arms = {"left_rcm_error_max_mm": 1.0, "right_rcm_error_max_mm": 2.0, "right_tip_error_max_mm": 3.0}
+    assert gallery.result({**found, "figures": arms}).endswith(
+        ". left: RCM max 1 mm; right: RCM max 2 mm, tip max 3 mm."
+    )
+    stopped = {**found, "outcome": "tip_limit", "t_s": 1.047, "detail": "too far", "figures": {}}
+    assert gallery.result(stopped) == "**Ends as `tip_limit`** at 1.05 s: too far."
 
 
 def test_the_picture_of_the_paths_is_that_of_the_current_paths(made):

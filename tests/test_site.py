@@ -127,6 +127,16 @@ def test_a_page_is_read_without_scripts(site):
 
 
 @pytest.mark.needs("sphinx")
+def test_the_gallery_has_all_scenarios_and_its_pictures_are_loaded_when_they_are_seen(site):
+    text = (site / "docs" / "gallery.html").read_text(encoding="utf-8")
+    names, plain = surgsim.available("scenarios"), re.sub(r"<[^>]*>", "", text)
+    assert [name for name in names if f"surgsim run {name}" not in plain] == []
+    pictures = re.findall(r"<img [^>]*_images[^>]*>", text)
+    assert len(pictures) > len(names)
+    assert [picture for picture in pictures if 'loading="lazy"' not in picture] == []
+
+
+@pytest.mark.needs("sphinx")
 def test_a_recorded_run_is_there_with_the_viewer_that_asks_no_other_host(site, pages):
     folder = site / "docs" / "recorded_run"
     assert folder / "index.html" in pages

@@ -1,7 +1,8 @@
 """Makes the pictures, tables and pages of the documents again: what `make pictures` does.
 
 The pictures of the scenes need OpenGL; a machine without it makes the rest and says so. Each picture carries
-a stamp of what it was made from, and `tests/test_made.py` compares that with what is there now.
+a stamp of what it was made from, and `tests/test_made.py` compares that with what is there now. Scenarios of
+the gallery are run and drawn only where picture or result is out of date.
 """
 
 import hashlib
@@ -16,7 +17,7 @@ import gallery
 import numpy as np
 import tables
 from PIL import Image
-from stamps import digest, save
+from stamps import digest, mark, save
 
 from surgsim.errors import SurgsimError
 from surgsim.models.arm import ArmModel
@@ -119,13 +120,24 @@ def draw_moving(file: str) -> None:
         _surgsim("run", name, "--controller", controller, "--out", f"{folder}/run")
         options = ("--camera", cameras, "--speed", speed, "--fps", "8", "--size", "480x480")
         _surgsim("export", f"{folder}/run", "--video", str(path), "--force", *options)
-    stamp = moving_stamp(file).encode()
-    remark = b"\x21\xfe" + bytes([len(stamp)]) + stamp + b"\x00"
-    path.write_bytes(path.read_bytes().removesuffix(b";") + remark + b";")  # a GIF ends with a semicolon
+    mark(path, moving_stamp(file))
 
 
 def _surgsim(*words: str) -> None:
     subprocess.run([sys.executable, "-m", "surgsim", *words], cwd=tables.ROOT, check=True)
+
+
+def draw_scenes() -> None:
+    """Draw all pictures of scenes.
+
+    Raises:
+        SurgsimError: If this machine cannot draw.
+        subprocess.CalledProcessError: If a run fails.
+    """
+    for file in SCENES:
+        draw_scene(file)
+    for file in MOVING:
+        draw_moving(file)
 
 
 def draw_errors() -> None:
@@ -177,21 +189,19 @@ def draw_paths() -> None:
 def main() -> int:
     """Make everything; 1 if the scenes could not be drawn."""
     tables.main()
-    gallery.main()
     draw_paths()
     draw_errors()
     concepts.main()
     for folder in sorted(path.parent for path in tables.RESULTS.glob("*/runs.csv")):
         print(write_report(folder))
-    try:
-        for file in SCENES:
-            draw_scene(file)
-        for file in MOVING:
-            draw_moving(file)
-    except (SurgsimError, subprocess.CalledProcessError) as error:
-        print(error, file=sys.stderr)
-        return 1
-    return 0
+    failed = 0
+    for part in (draw_scenes, gallery.main):
+        try:
+            part()
+        except (SurgsimError, subprocess.CalledProcessError) as error:
+            print(error, file=sys.stderr)
+            failed = 1
+    return failed
 
 
 if __name__ == "__main__":

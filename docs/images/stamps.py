@@ -8,6 +8,9 @@ from PIL import Image
 from PIL.PngImagePlugin import PngInfo
 
 _NAME = "surgsim"
+_LONG = hashlib.sha256().digest_size * 2
+_REMARK = b"\x21\xfe" + bytes([_LONG])
+"""How a remark of that many letters begins in a GIF; a zero ends it, and a semicolon the file."""
 
 
 def digest(parts: Iterable[str]) -> str:
@@ -17,6 +20,9 @@ def digest(parts: Iterable[str]) -> str:
 
 def stamped(path: Path) -> str:
     """The stamp that a picture carries; empty without one."""
+    if path.suffix == ".gif":
+        remark = path.read_bytes()[-len(_REMARK) - _LONG - 2 :]
+        return remark[len(_REMARK) : -2].decode() if remark.startswith(_REMARK) else ""
     with Image.open(path) as image:
         return str(image.info.get(_NAME, ""))
 
@@ -26,4 +32,10 @@ def save(image: Image.Image, path: Path, stamp: str) -> None:
     about = PngInfo()
     about.add_text(_NAME, stamp)
     image.save(path, optimize=True, pnginfo=about)
+    print(path)
+
+
+def mark(path: Path, stamp: str) -> None:
+    """Put a stamp into a GIF that has none."""
+    path.write_bytes(path.read_bytes().removesuffix(b";") + _REMARK + stamp.encode() + b"\x00;")
     print(path)

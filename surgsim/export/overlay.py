@@ -39,13 +39,23 @@ def _error(value: float) -> str:
     return text.replace(" ", "\u2007")
 
 
-def written(picture: Picture, head: str, text: str, note: str = "") -> Picture:
-    """A picture with a band below: `head` above `text`; `note` is in the corner above."""
+def written(
+    picture: Picture, head: str, text: str, note: str = "", *, lines: int = _LINES_OF_A_PICTURE
+) -> Picture:
+    """A picture with a band below: `head` above `text`; `note` is in the corner above.
+
+    Args:
+        picture: Pixels (height, width, 3), RGB.
+        head: The upper line.
+        text: The lower line.
+        note: In the corner.
+        lines: How many letters are as high as the picture.
+    """
     height, width = picture.shape[:2]
     image = Image.fromarray(picture).convert("RGBA")
     band = Image.new("RGBA", image.size)
     draw = ImageDraw.Draw(band)
-    letters = _fitting(max(head, text, key=len), width, height)
+    letters = _fitting(max(head, text, key=len), width, height // lines)
     line = round(1.35 * letters.size)
     margin = letters.size // 2
     top = height - 2 * line - margin
@@ -59,9 +69,9 @@ def written(picture: Picture, head: str, text: str, note: str = "") -> Picture:
     return np.array(Image.alpha_composite(image, band).convert("RGB"), dtype=np.uint8)
 
 
-def _fitting(text: str, width: int, height: int) -> ImageFont.FreeTypeFont:
-    """Letters with which `text` fits into the width."""
-    size = max(_SMALLEST_LETTERS, height // _LINES_OF_A_PICTURE)
+def _fitting(text: str, width: int, size: int) -> ImageFont.FreeTypeFont:
+    """Letters of a size, or smaller, with which `text` fits into the width."""
+    size = max(_SMALLEST_LETTERS, size)
     room = width - size
     length = _letters(size).getlength(text)
     return _letters(max(_SMALLEST_LETTERS, int(size * min(1.0, room / max(length, 1.0)))))

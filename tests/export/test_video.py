@@ -171,6 +171,7 @@ def test_figures_are_as_long_at_every_time_and_are_written_into_the_band_below(r
     assert shown.max() > 200
     assert shown[:80].max() == 0
     assert written(dark, "name", "text", "inside")[:20].max() > 100
+    assert written(dark, "name", "text", lines=6)[:80].max() > 200  # larger letters, a higher band
 
 
 def test_a_gif_has_hundredths_of_a_second(tmp_path):
