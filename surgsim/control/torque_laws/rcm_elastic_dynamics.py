@@ -37,8 +37,6 @@ class RcmElasticDynamicsConfig(ElasticObserverConfig):
         damping_ratio: Of RCM and tip.
         contact: What becomes of the measured force on the tip, as of `rcm_inverse_dynamics`: `reject` or
             `yield`.
-        energy_valve: As of `rcm_inverse_dynamics`; needs `yield`.
-        press_max_n: As of `rcm_inverse_dynamics`; needs `yield` [N].
     """
 
     type: Literal["rcm_elastic_dynamics"] = "rcm_elastic_dynamics"
@@ -48,8 +46,6 @@ class RcmElasticDynamicsConfig(ElasticObserverConfig):
     joint_bandwidth_rad_per_s: NonNegativeFloat = 10.0
     damping_ratio: PositiveFloat = 0.7
     contact: Annotated[Literal["reject", "yield"], ADDED] = "reject"
-    energy_valve: Annotated[bool, ADDED] = False
-    press_max_n: Annotated[PositiveFloat | None, ADDED] = None
 
     def build(self, arm: ArmModel) -> KernelTorqueLaw:
         """The law; its memory is the observer's."""
@@ -68,8 +64,6 @@ class RcmElasticDynamicsConfig(ElasticObserverConfig):
                         (joint**2, 1.0),
                         0.0,
                         self.contact == "yield",
-                        self.energy_valve,
-                        self.press_max_n or 0.0,
                     ),
                     numbers,
                 ]
@@ -85,7 +79,9 @@ def rcm_elastic_dynamics(gains: Array, seen: Seen, memory: Array, out: Array) ->
 
     `surgsim.control.elastic_observer` gives that state, d and f; the accelerations are those of the hierarchy
     of `rcm_inverse_dynamics`, weighted with M + B_s: what a torque behind the torque loop moves below its
-    bandwidth. The command changes no faster than the arm's interface takes.
+    bandwidth. The command changes no faster than the arm's interface takes. With `contact: yield` the torque
+    J_T' f of the measured force on the tip is part of d from the first tick, and the observer is left the
+    rest; the tip gives way along f as with `rcm_inverse_dynamics`.
 
     Rows tip, rcm, joint, bias, observer, limits (6, n) [N m].
 

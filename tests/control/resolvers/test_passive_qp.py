@@ -11,6 +11,7 @@ from surgsim.control.failure import ControlFailure
 from surgsim.control.planes import PlaneConfig
 from surgsim.control.problem import braking_bounds
 from surgsim.control.resolvers.passive_qp import PassiveQpConfig
+from surgsim.control.tip_energy import MARGIN
 from surgsim.tasks.base import EnergyBudget
 
 seeds = pytest.mark.parametrize("seed", range(5))
@@ -188,3 +189,22 @@ def test_the_resolved_motion_leads_the_measured_tip_by_no_more_than_allowed(velo
         answer, memory = resolver.step(p, memory)
     lead = np.linalg.norm(answer.command.p_WTd - p.kin.p_WT)
     assert lead == pytest.approx(0.002 + p.dt_s * np.linalg.norm(answer.command.v_WTd), rel=0.01)
+
+
+@seeds
+def test_the_kinetic_scale_follows_a_share_of_the_budget_with_its_lag(velocity_problem, seed):
+    """Against the closed form, with the tip's inertia by the constrained inverse of the mass matrix."""
+    arm = usual_arm()
+    p = _problem(velocity_problem, seed, budget=EnergyBudget(most_j=2e-4, f_T=np.zeros(3)), speed=0.05)
+    inverse, J = np.linalg.inv(arm.dynamics(p.q, p.v).mass_matrix), p.rcm.jacobian
+    held = inverse - inverse @ J.T @ np.linalg.inv(J @ inverse @ J.T) @ J @ inverse
+    inertia = np.linalg.inv(p.kin.Jv_WT @ held @ p.kin.Jv_WT.T)
+    v_d = p.command.v_WTd
+    covered = np.sqrt(0.25 * 2e-4 / (0.5 * MARGIN * v_d @ inertia @ v_d))
+    assert 0.01 < covered < 0.9
+    config = PassiveQpConfig(passivity=False, kinetic=True, kinetic_lag_s=0.05, kinetic_share=0.25)
+    for count in (1, 20, 400):
+        answer = _steps(config, p, count)
+        scale = covered + (1.0 - covered) * (1.0 - p.dt_s / 0.05) ** count
+        np.testing.assert_allclose(p.kin.Jv_WT @ answer.qdot - _slack(answer)[:3], scale * v_d, atol=1e-9)
+        assert _active(answer)["passivity"] == 1.0
