@@ -15,8 +15,8 @@ MOST_RCM_MM = 0.3
 CONTROLLER = load_scenario("teleop_wall_panda", controller="passive_elastic").controller
 WALLED = (  # its walls and its speed limit are its own controller's
     f"controller.torque_law={CONTROLLER.torque_law.model_dump_json()}",
-    "controller.resolver.kinetic_lag_s=0.02",
-    "controller.resolver.kinetic_share=0.1",
+    f"controller.resolver.kinetic_lag_s={CONTROLLER.resolver.kinetic_lag_s}",
+    f"controller.resolver.kinetic_share={CONTROLLER.resolver.kinetic_share}",
 )
 QUICK = ("teleop_wall_lwr4plus", "teleop_tissue_fr3")
 OTHERS = (
@@ -60,7 +60,7 @@ def test_walls_of_the_workspace(seed):
 
 @pytest.mark.slow
 def test_random_settings_are_passive():
-    """A hundred of those of the ideal drives, by power integrals made here."""
+    """A hundred of those of the ideal drives, by the same power integrals."""
     for number in range(0, 200, 2):
         _, assignments = settings(number)
         trace = simulate(

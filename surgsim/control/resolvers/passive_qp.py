@@ -2,10 +2,10 @@
 
 import math
 from collections.abc import Mapping
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, ClassVar, Literal, Self
 
 import numpy as np
-from pydantic import AfterValidator, Field, NonNegativeFloat, PositiveFloat
+from pydantic import AfterValidator, Field, NonNegativeFloat, PositiveFloat, model_validator
 
 from surgsim.array import Array
 from surgsim.catalog import ADDED, PartConfig
@@ -47,6 +47,7 @@ _BUDGET, _WALLS, _RELAXED = 4, 5, 6  # places of the values after the slacks
 _SLACKS = 4
 _TASK_ROWS = 10  # tip, roll, RCM, budget, speed
 _ACTIVE = 1e-9
+_WHOLE = 0.999  # a scale that comes back to 1 is 1 from here on
 
 
 class PassiveQpConfig(PartConfig):
@@ -61,8 +62,8 @@ class PassiveQpConfig(PartConfig):
         passivity: Whether the energy budget is a row.
         kinetic: Whether the commanded velocity is scaled so that the budget covers its kinetic energy.
         kinetic_lag_s: Time constant of that scale [s]; one that follows every change of the budget excites
-            elastic drives.
-        kinetic_share: Share of the budget that the command's kinetic energy may have.
+            elastic drives, and one that lags does not cover every instant. It needs `kinetic`.
+        kinetic_share: Share of the budget that the command's kinetic energy may have; it needs `kinetic`.
         budget_share: Share of the tank's budget that one period may spend; 1 is the paper's.
         planes: Virtual walls of the workspace.
         plane_gain_per_s: How fast the tip may approach a wall [1/s].
@@ -88,6 +89,13 @@ class PassiveQpConfig(PartConfig):
     tip_speed_max_m_per_s: PositiveFloat = 0.25
     lead_max_m: PositiveFloat = 0.001
     solver: Annotated[str, AfterValidator(check_solver)] = OWN
+
+    @model_validator(mode="after")
+    def _is_scaled(self) -> Self:
+        for key, nothing in (("kinetic_lag_s", 0.0), ("kinetic_share", 1.0)):
+            if not self.kinetic and getattr(self, key) != nothing:
+                raise ValueError(f"{key} needs kinetic: true, or nothing is scaled")
+        return self
 
     def check_installed(self) -> None:
         """Refuse a solver that is not installed.
@@ -147,7 +155,8 @@ def passive_qp(gains: Array, seen: Seen, memory: Array, out: Resolved) -> int:
     Source: passive convex teleoperation paper, sections 1.1-1.4.
     """
     n = seen.q.size
-    _begin(gains, seen, memory)
+    _begin(seen, memory)
+    _scale_command(gains, seen, memory)
     sides, x, relaxed = memory[n + 6 : -1], np.empty(n + _SLACKS), 0.0
     program = passive_program(gains, seen, memory, True)
     sides = sides[: x.size + program[5].size]
@@ -161,7 +170,8 @@ def passive_qp(gains: Array, seen: Seen, memory: Array, out: Resolved) -> int:
 
 def _solved_in_python(solver: Solver, gains: Array, seen: Seen, memory: Array, out: Resolved) -> int:
     """The law of `passive_qp` by another solver."""
-    _begin(gains, seen, memory)
+    _begin(seen, memory)
+    _scale_command(gains, seen, memory)
     program, relaxed = passive_program(gains, seen, memory, True), 0.0
     x = solver(program)
     if x is None:
@@ -185,19 +195,26 @@ def _covered(gains: Array, seen: Seen) -> float:
 
 
 @compiled
-def _begin(gains: Array, seen: Seen, memory: Array) -> None:
-    """The memory before the first tick: the measured motion. At every tick: the scale of the command."""
+def _begin(seen: Seen, memory: Array) -> None:
+    """The memory before the first tick: the measured motion, and a command that is not scaled."""
     n = seen.q.size
     if seen.first != 0:
         memory[:n] = seen.v
         times(seen.Jv_WT, seen.v, memory[n : n + 3])
         memory[n + 3 : n + 6] = seen.p_WT
         memory[-1] = 1.0
+
+
+@compiled
+def _scale_command(gains: Array, seen: Seen, memory: Array) -> None:
+    """Move the command's scale towards what the budget covers."""
     covered = _covered(gains, seen)
     if gains[LAG] <= seen.dt_s:
         memory[-1] = covered
-    else:
-        memory[-1] += (covered - memory[-1]) * seen.dt_s / gains[LAG]
+        return
+    memory[-1] += (covered - memory[-1]) * seen.dt_s / gains[LAG]
+    if covered == 1.0 and memory[-1] > _WHOLE:
+        memory[-1] = 1.0
 
 
 @compiled
@@ -273,7 +290,7 @@ def _answer(
     for i in range(budget, most.size - 3):
         if dot(G[i], x) >= most[i] - _ACTIVE:
             out.values[_BUDGET if i == budget else _WALLS] += 1.0
-    if memory[-1] < 1.0 - _ACTIVE:
+    if memory[-1] < 1.0:
         out.values[_BUDGET] = 1.0
     out.residual = norm(x[n : n + 3])
 
