@@ -134,18 +134,26 @@ def _as_good_as_rigid(n: int) -> Drive:
 
 
 @compiled
-def look_ahead(numbers: Array, seen: Seen, memory: Array, d: Array) -> int:
-    """Evaluate `seen.elsewhere` where the arm will be when the next command acts; d (n,) is d - f [N m]."""
+def look_ahead(numbers: Array, seen: Seen, memory: Array, touch: Array, d: Array) -> int:
+    """Evaluate `seen.elsewhere` where the arm will be when the next command acts.
+
+    Args:
+        numbers: Of `ElasticObserverConfig.numbers`.
+        seen: What is measured.
+        memory: State, disturbances and commands.
+        touch: Measured torque of the surroundings on the links, which the observer need not find (n,) [N m].
+        d: Filled with d - f, `touch` in it (n,) [N m].
+    """
     n, dt, delay = seen.q.size, seen.dt_s, int(numbers[DELAY])
     rows, M = memory[: ROWS * n].reshape((ROWS, n)), memory[ROWS * n : (ROWS + n) * n].reshape((n, n))
     sent, drives = memory[(ROWS + n) * n :].reshape((delay + 1, n)), numbers[DRIVES:].reshape((5, n))
     x, rest, f, L = scratch_matrix(4, n), scratch(n), scratch(n), scratch_matrix(n, n)
     if seen.first:
-        _begin(drives, seen, rows, M, sent)
+        _begin(drives, seen, touch, rows, M, sent)
     if not factor_step(drives, M, dt, L):
         return RANK_LOST
     for i in range(n):
-        rest[i], f[i] = rows[REST, i] + rows[LINK, i], rows[MOTOR, i] + rows[FRICTION, i]
+        rest[i], f[i] = rows[REST, i] + rows[LINK, i] + touch[i], rows[MOTOR, i] + rows[FRICTION, i]
     if not seen.first:
         step(drives, M, L, rest, f, sent[delay], dt, rows)
         _correct(numbers, drives, M, seen, rows)
@@ -153,8 +161,8 @@ def look_ahead(numbers: Array, seen: Seen, memory: Array, d: Array) -> int:
         y = min(max(seen.qdot_ref[i] / numbers[BAND], -1.0), 1.0)
         rows[DRY, i] = max(rows[DRY, i] + numbers[LEARNING] * dt * rows[MOTOR, i] * y, 0.0)
         rows[FRICTION, i] = rows[DRY, i] * y
-        rest[i], f[i] = rows[REST, i] + rows[LINK, i], rows[MOTOR, i] + rows[FRICTION, i]
-        d[i] = rows[LINK, i] - f[i]
+        rest[i], f[i] = rows[REST, i] + rows[LINK, i] + touch[i], rows[MOTOR, i] + rows[FRICTION, i]
+        d[i] = rows[LINK, i] + touch[i] - f[i]
         for k in range(4):
             x[k, i] = rows[k, i]
     for k in range(delay - 1, -1, -1):
@@ -194,11 +202,11 @@ def send(numbers: Array, seen: Seen, memory: Array, out: Array, limits: int) -> 
 
 
 @compiled
-def _begin(drives: Array, seen: Seen, rows: Array, M: Array, sent: Array) -> None:
+def _begin(drives: Array, seen: Seen, touch: Array, rows: Array, M: Array, sent: Array) -> None:
     """The arm is at rest: what its gears bear beyond the nominal weight is a disturbance of the links."""
     for i in range(seen.q.size):
         rows[Q, i], rows[S, i] = seen.q[i], seen.tau[i] / drives[STIFFNESS, i]
-        rows[LINK, i] = seen.bias[i] - seen.tau[i]
+        rows[LINK, i] = seen.bias[i] - seen.tau[i] - touch[i]
         for k in range(sent.shape[0]):
             sent[k, i] = seen.tau[i]
     _take_model(drives, seen.M, seen.bias, seen.dt_s, rows, M)

@@ -21,6 +21,7 @@ NEXT = {
     "run circle_panda --co": ["--controller"],
     "run circle_panda --controller p": [
         "passive_convex",
+        "passive_elastic",
         "passive_kinetic",
         "pinv",
         "policy_proportional",

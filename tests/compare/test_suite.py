@@ -262,6 +262,7 @@ def test_the_full_suite_leaves_nothing_out():
     assert sorted(suite.scenarios) == sorted(paths)
     elsewhere = {
         "passive_convex",
+        "passive_elastic",
         "passive_kinetic",
         "hands_on_admittance",
     }  # made for an operator, and for a hand

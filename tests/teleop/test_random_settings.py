@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from surgsim.errors import Outcome
 from surgsim.metrics.catalog import compute_metrics
 from surgsim.scenario.load import load_scenario
 from surgsim.simulate.loop import simulate
@@ -126,3 +127,28 @@ def test_random_settings_with_clutch_changing_scale_roll_and_filter():
     for number in (*range(0, 48, 2), *range(1, 41, 2)):
         metrics = check(*re_indexed(number))
         assert metrics["clutchings"] >= 1.0
+
+
+@pytest.mark.slow
+def test_random_settings_on_real_drives_are_passive():
+    """A hundred of those of the ideal drives, by the same power integrals; 66 is the lightest grip of all."""
+    failed = []
+    for number in range(0, 200, 2):
+        _, assignments = settings(number)
+        trace = simulate(
+            load_scenario(
+                "teleop_wall_panda",
+                controller="passive_elastic",
+                assignments=(*assignments, "robot.drive={friction_spread: 0.2}"),
+            )
+        )
+        run, metrics = trace.active(), compute_metrics(trace)
+        to_hand, to_wall, exchanged = own_works(run)
+        stored = float(run["tank_operator_j"][0] + run["tank_remote_j"][0] + run["in_flight_j"][0])
+        assert float((to_hand + to_wall).max()) - stored <= PASSIVE_J + SHARE * exchanged
+        assert not [fault for fault in faults(run) if fault.startswith("it was active")]
+        assert metrics["tank_deficit_j"] == 0.0
+        assert metrics["acceleration_limit_ratio"] <= 1.0 + 1e-6
+        if trace.meta.ending.outcome is not Outcome.COMPLETED or metrics["rcm_error_max_mm"] > 0.3:
+            failed.append(number)
+    assert failed == [66]

@@ -2,13 +2,13 @@
 
 import math
 from collections.abc import Mapping
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, ClassVar, Literal, Self
 
 import numpy as np
-from pydantic import AfterValidator, Field, NonNegativeFloat, PositiveFloat
+from pydantic import AfterValidator, Field, NonNegativeFloat, PositiveFloat, model_validator
 
 from surgsim.array import Array
-from surgsim.catalog import PartConfig
+from surgsim.catalog import ADDED, PartConfig
 from surgsim.columns import Block, scalar, vector
 from surgsim.compiled import compiled
 from surgsim.control.limit_avoidance import fill_avoidance
@@ -32,8 +32,10 @@ from surgsim.tick.arrays import Resolved, Seen
 from surgsim.tick.scratch import scratch, scratch_matrix
 from surgsim.tick.status import GOES_ON, INFEASIBLE
 
-WEIGHT, SLACK, ROLL_SLACK, K_TIP, K_RCM, SHARE, SPEED, LEAD, WALL_GAIN, KINETIC, WALLS = range(11)
-"""Gains: w, w_s, w_r, k_tip, k_rcm, share of the budget or 0, v_max, lead, walls' gain, kinetic, walls."""
+WEIGHT, SLACK, ROLL_SLACK, K_TIP, K_RCM, SHARE, SPEED, LEAD, WALL_GAIN = range(9)
+KINETIC, LAG, KINETIC_SHARE, WALLS = range(9, 13)
+"""Gains: w, w_s, w_r, k_tip, k_rcm, share of the budget or 0, v_max, lead, walls' gain; whether kinetic, its
+lag and share; walls."""
 COLUMNS: tuple[Block, ...] = (
     vector("slack", "m_per_s"),
     scalar("slack_roll", "rad_per_s"),
@@ -45,6 +47,7 @@ _BUDGET, _WALLS, _RELAXED = 4, 5, 6  # places of the values after the slacks
 _SLACKS = 4
 _TASK_ROWS = 10  # tip, roll, RCM, budget, speed
 _ACTIVE = 1e-9
+_WHOLE = 0.999  # a scale that comes back to 1 is 1 from here on
 
 
 class PassiveQpConfig(PartConfig):
@@ -58,6 +61,9 @@ class PassiveQpConfig(PartConfig):
         k_rcm: K_rcm [1/s].
         passivity: Whether the energy budget is a row.
         kinetic: Whether the commanded velocity is scaled so that the budget covers its kinetic energy.
+        kinetic_lag_s: Time constant of that scale [s]; one that follows every change of the budget excites
+            elastic drives, and one that lags does not cover every instant. It needs `kinetic`.
+        kinetic_share: Share of the budget that the command's kinetic energy may have; it needs `kinetic`.
         budget_share: Share of the tank's budget that one period may spend; 1 is the paper's.
         planes: Virtual walls of the workspace.
         plane_gain_per_s: How fast the tip may approach a wall [1/s].
@@ -75,12 +81,21 @@ class PassiveQpConfig(PartConfig):
     k_rcm: NonNegativeFloat = 5.0
     passivity: bool = True
     kinetic: bool = False
+    kinetic_lag_s: Annotated[NonNegativeFloat, ADDED] = 0.0
+    kinetic_share: Annotated[float, Field(gt=0.0, le=1.0), ADDED] = 1.0
     budget_share: Annotated[float, Field(gt=0.0, le=1.0)] = 1.0
     planes: tuple[PlaneConfig, ...] = ()
     plane_gain_per_s: PositiveFloat = 20.0
     tip_speed_max_m_per_s: PositiveFloat = 0.25
     lead_max_m: PositiveFloat = 0.001
     solver: Annotated[str, AfterValidator(check_solver)] = OWN
+
+    @model_validator(mode="after")
+    def _is_scaled(self) -> Self:
+        for key, nothing in (("kinetic_lag_s", 0.0), ("kinetic_share", 1.0)):
+            if not self.kinetic and getattr(self, key) != nothing:
+                raise ValueError(f"{key} needs kinetic: true, or nothing is scaled")
+        return self
 
     def check_installed(self) -> None:
         """Refuse a solver that is not installed.
@@ -95,13 +110,13 @@ class PassiveQpConfig(PartConfig):
         n, walls = arm.limits.q_min.size, len(self.planes)
         numbers = [self.velocity_weight, self.slack_weight, self.roll_slack_weight, self.k_tip, self.k_rcm]
         numbers += [self.budget_share * self.passivity, self.tip_speed_max_m_per_s, self.lead_max_m]
-        numbers += [self.plane_gain_per_s, self.kinetic]
+        numbers += [self.plane_gain_per_s, self.kinetic, self.kinetic_lag_s, self.kinetic_share]
         text = f"QP: no joint velocity meets the RCM, {walls} planes, the energy budget and the bounds"
         return KernelResolver(
             kernel=passive_qp if self.solver == OWN else SolvedInPython(_solved_in_python, self.solver),
             arm=arm,
             gains=np.concatenate((np.array(numbers, dtype=np.float64), plane_numbers(self.planes))),
-            memory_size=2 * n + 6 + _SLACKS + _TASK_ROWS + walls,
+            memory_size=2 * n + 7 + _SLACKS + _TASK_ROWS + walls,
             columns=COLUMNS,
             failures={INFEASIBLE: text},
             examine=_examine,
@@ -126,7 +141,7 @@ def passive_qp(gains: Array, seen: Seen, memory: Array, out: Resolved) -> int:
     That row covers what the tip gives away at the force of now, not the motion that an impact stops. With
     `kinetic` the command is scaled before,
 
-        v_d := v_d min(1, sqrt(2 (T - epsilon) / v_d' L v_d))
+        v_d := s v_d,   lag s' = min(1, sqrt(2 share (T - epsilon) / v_d' L v_d)) - s
 
     with the tip's inertia L (RCM held): no row, so that no bound has to give way to it. That is ours.
 
@@ -134,14 +149,15 @@ def passive_qp(gains: Array, seen: Seen, memory: Array, out: Resolved) -> int:
     `lead_max_m`. The instrument has no wrist, so of the paper's angular rows the roll is the one left free by
     the RCM.
 
-    Memory: the last q' (n,), its tip velocity (3,), the tip reference integrated from it (3,), and the sides
-    of the last solution.
+    Memory: the last q' (n,), its tip velocity (3,), the tip reference integrated from it (3,), the sides of
+    the last solution, and the scale s.
 
     Source: passive convex teleoperation paper, sections 1.1-1.4.
     """
     n = seen.q.size
     _begin(seen, memory)
-    sides, x, relaxed = memory[n + 6 :], np.empty(n + _SLACKS), 0.0
+    _scale_command(gains, seen, memory)
+    sides, x, relaxed = memory[n + 6 : -1], np.empty(n + _SLACKS), 0.0
     program = passive_program(gains, seen, memory, True)
     sides = sides[: x.size + program[5].size]
     if not solve_warm(program, sides, x):
@@ -155,6 +171,7 @@ def passive_qp(gains: Array, seen: Seen, memory: Array, out: Resolved) -> int:
 def _solved_in_python(solver: Solver, gains: Array, seen: Seen, memory: Array, out: Resolved) -> int:
     """The law of `passive_qp` by another solver."""
     _begin(seen, memory)
+    _scale_command(gains, seen, memory)
     program, relaxed = passive_program(gains, seen, memory, True), 0.0
     x = solver(program)
     if x is None:
@@ -167,16 +184,6 @@ def _solved_in_python(solver: Solver, gains: Array, seen: Seen, memory: Array, o
 
 
 @compiled
-def _begin(seen: Seen, memory: Array) -> None:
-    """The memory before the first tick: the measured motion."""
-    n = seen.q.size
-    if seen.first != 0:
-        memory[:n] = seen.v
-        times(seen.Jv_WT, seen.v, memory[n : n + 3])
-        memory[n + 3 : n + 6] = seen.p_WT
-
-
-@compiled
 def _covered(gains: Array, seen: Seen) -> float:
     """Share of the commanded velocity whose kinetic energy the budget covers."""
     if gains[KINETIC] == 0.0 or not math.isfinite(seen.budget_j):
@@ -184,7 +191,30 @@ def _covered(gains: Array, seen: Seen) -> float:
     inertia = scratch_matrix(3, 3)
     if not fill_tip_inertia(seen, inertia):
         return 0.0
-    return affordable_speed(inertia, seen.v_WTd, seen.budget_j)
+    return affordable_speed(inertia, seen.v_WTd, gains[KINETIC_SHARE] * seen.budget_j)
+
+
+@compiled
+def _begin(seen: Seen, memory: Array) -> None:
+    """The memory before the first tick: the measured motion, and a command that is not scaled."""
+    n = seen.q.size
+    if seen.first != 0:
+        memory[:n] = seen.v
+        times(seen.Jv_WT, seen.v, memory[n : n + 3])
+        memory[n + 3 : n + 6] = seen.p_WT
+        memory[-1] = 1.0
+
+
+@compiled
+def _scale_command(gains: Array, seen: Seen, memory: Array) -> None:
+    """Move the command's scale towards what the budget covers."""
+    covered = _covered(gains, seen)
+    if gains[LAG] <= seen.dt_s:
+        memory[-1] = covered
+        return
+    memory[-1] += (covered - memory[-1]) * seen.dt_s / gains[LAG]
+    if covered == 1.0 and memory[-1] > _WHOLE:
+        memory[-1] = 1.0
 
 
 @compiled
@@ -207,7 +237,7 @@ def passive_program(gains: Array, seen: Seen, memory: Array, braking: bool) -> P
     if fill_avoidance(seen, True, away):
         for j in range(n):
             f[j] = -gains[WEIGHT] * away[j]
-    share = _covered(gains, seen)
+    share = memory[-1]
     for i in range(3):
         G[i, :n] = seen.Jv_WT[i]
         low[i] = high[i] = share * seen.v_WTd[i] - gains[K_TIP] * (seen.p_WT[i] - seen.p_WTd[i])
@@ -260,7 +290,7 @@ def _answer(
     for i in range(budget, most.size - 3):
         if dot(G[i], x) >= most[i] - _ACTIVE:
             out.values[_BUDGET if i == budget else _WALLS] += 1.0
-    if _covered(gains, seen) < 1.0:
+    if memory[-1] < 1.0:
         out.values[_BUDGET] = 1.0
     out.residual = norm(x[n : n + 3])
 

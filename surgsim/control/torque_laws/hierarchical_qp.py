@@ -240,22 +240,20 @@ def hierarchical_qp(gains: Array, seen: Seen, memory: Array, out: Array) -> int:
     IJRR 33:1006 (2014); weighted, with tau eliminated, Del Prete et al., TSID (2016). They have no observer.
     """
     n, kind = seen.q.size, gains[KIND]
-    d, late, share = scratch(n), 0.0, 1.0
+    d, touch, late, share = scratch(n), scratch(n), 0.0, 1.0
     numbers, elastic = gains[FORESEEN : FORESEEN + 3 + n], gains[FORESEEN + 3 + n : FORESEEN + 11 + 6 * n]
     planes = gains[FORESEEN + 11 + 6 * n :]
     begin = memory.size - (2 * n + 6 + planes.size // 4)
     last, observed, sides = memory[:n], memory[n:begin], memory[begin:]
-    d[:] = 0.0
+    d[:], touch[:] = 0.0, 0.0
     if seen.first != 0:
         last[:] = seen.tau
     if kind == ELASTIC:
-        status = look_ahead(elastic, seen, observed, d)
+        status = look_ahead(elastic, seen, observed, touch, d)
         if status != GOES_ON:
             return status
         late = elastic[DELAY] * seen.dt_s
     elif kind == MOMENTUM:
-        touch = scratch(n)
-        touch[:] = 0.0
         late = foresee(numbers, seen, observed, touch, d)
         if late < 0.0:
             return RANK_LOST

@@ -64,8 +64,9 @@ def joint_elastic_dynamics(gains: Array, seen: Seen, memory: Array, out: Array) 
     Source: computed torque, e.g. Siciliano et al., Robotics (2009), section 8.5.2.
     """
     n, numbers = seen.q.size, gains[_GAINS:]
-    d, a, torque = scratch(n), scratch(n), scratch(n)
-    status = look_ahead(numbers, seen, memory, d)
+    d, a, torque, touch = scratch(n), scratch(n), scratch(n), scratch(n)
+    touch[:] = 0.0
+    status = look_ahead(numbers, seen, memory, touch, d)
     if status != GOES_ON:
         return status
     model, late = seen.elsewhere, numbers[DELAY] * seen.dt_s

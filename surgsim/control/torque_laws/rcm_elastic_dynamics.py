@@ -1,11 +1,12 @@
 """RCM inverse dynamics on elastic drives: RCM over tip over posture, links and motors observed apart."""
 
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
 from pydantic import NonNegativeFloat, PositiveFloat
 
 from surgsim.array import Array
+from surgsim.catalog import ADDED
 from surgsim.compiled import compiled
 from surgsim.control.elastic_observer import DELAY, ElasticObserverConfig, look_ahead, send
 from surgsim.control.torque_laws.base import KernelTorqueLaw
@@ -13,10 +14,12 @@ from surgsim.control.torque_laws.rcm_hierarchy import (
     HIERARCHY_GAINS,
     LIMITS,
     TERMS,
+    YIELDS,
     fill_terms,
     hierarchy_gains,
 )
 from surgsim.models.arm import ArmModel
+from surgsim.tick.algebra import transposed_times
 from surgsim.tick.arrays import Seen
 from surgsim.tick.scratch import scratch
 from surgsim.tick.status import GOES_ON, INFEASIBLE
@@ -32,6 +35,8 @@ class RcmElasticDynamicsConfig(ElasticObserverConfig):
         tip_bandwidth_ratio: The tip's bandwidth over the RCM's.
         joint_bandwidth_rad_per_s: About the joint reference in the remaining null space [rad/s].
         damping_ratio: Of RCM and tip.
+        contact: What becomes of the measured force on the tip, as of `rcm_inverse_dynamics`: `reject` or
+            `yield`.
     """
 
     type: Literal["rcm_elastic_dynamics"] = "rcm_elastic_dynamics"
@@ -40,6 +45,7 @@ class RcmElasticDynamicsConfig(ElasticObserverConfig):
     tip_bandwidth_ratio: PositiveFloat = 1.0
     joint_bandwidth_rad_per_s: NonNegativeFloat = 10.0
     damping_ratio: PositiveFloat = 0.7
+    contact: Annotated[Literal["reject", "yield"], ADDED] = "reject"
 
     def build(self, arm: ArmModel) -> KernelTorqueLaw:
         """The law; its memory is the observer's."""
@@ -51,7 +57,16 @@ class RcmElasticDynamicsConfig(ElasticObserverConfig):
             arm=arm,
             terms=TERMS,
             gains=np.concatenate(
-                [hierarchy_gains((rcm**2, ratio), (tip**2, ratio), (joint**2, 1.0)), numbers]
+                [
+                    hierarchy_gains(
+                        (rcm**2, ratio),
+                        (tip**2, ratio),
+                        (joint**2, 1.0),
+                        0.0,
+                        self.contact == "yield",
+                    ),
+                    numbers,
+                ]
             ),
             memory_size=self.memory_size(arm.limits.torque.size),
             failures={INFEASIBLE: "no joint acceleration keeps all limits"},
@@ -64,15 +79,20 @@ def rcm_elastic_dynamics(gains: Array, seen: Seen, memory: Array, out: Array) ->
 
     `surgsim.control.elastic_observer` gives that state, d and f; the accelerations are those of the hierarchy
     of `rcm_inverse_dynamics`, weighted with M + B_s: what a torque behind the torque loop moves below its
-    bandwidth. The command changes no faster than the arm's interface takes.
+    bandwidth. The command changes no faster than the arm's interface takes. With `contact: yield` the torque
+    J_T' f of the measured force on the tip is part of d from the first tick, and the observer is left the
+    rest; the tip gives way along f as with `rcm_inverse_dynamics`.
 
     Rows tip, rcm, joint, bias, observer, limits (6, n) [N m].
 
     Source: ours; that links and motors move as one below the drives' bandwidth is the slow part of singular
     perturbation, Spong, Khorasani and Kokotovic, IEEE J. Robotics and Automation 3:294 (1987).
     """
-    numbers, d = gains[HIERARCHY_GAINS:], scratch(seen.q.size)
-    status = look_ahead(numbers, seen, memory, d)
+    numbers, d, touch = gains[HIERARCHY_GAINS:], scratch(seen.q.size), scratch(seen.q.size)
+    touch[:] = 0.0
+    if gains[YIELDS] != 0.0:
+        transposed_times(seen.Jv_WT, seen.f_T, touch)
+    status = look_ahead(numbers, seen, memory, touch, d)
     if status != GOES_ON:
         return status
     status = fill_terms(gains, seen, seen.elsewhere, numbers[DELAY] * seen.dt_s, d, 1.0, out)

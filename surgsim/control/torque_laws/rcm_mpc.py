@@ -133,8 +133,9 @@ def rcm_mpc(gains: Array, seen: Seen, memory: Array, out: Array) -> int:
     n, numbers = seen.q.size, gains[OBSERVER:]
     blocks = int(gains[BLOCKS])
     size = memory.size - rows_of(n, blocks)
-    d = scratch(n)
-    status = look_ahead(numbers, seen, memory[:size], d)
+    d, touch = scratch(n), scratch(n)
+    touch[:] = 0.0
+    status = look_ahead(numbers, seen, memory[:size], touch, d)
     if status != GOES_ON:
         return status
     u = np.empty(n * blocks)

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from pydantic import ValidationError
 from scipy.optimize import minimize
 from usual_arm import usual_arm
 
@@ -11,7 +12,11 @@ from surgsim.control.failure import ControlFailure
 from surgsim.control.planes import PlaneConfig
 from surgsim.control.problem import braking_bounds
 from surgsim.control.resolvers.passive_qp import PassiveQpConfig
+from surgsim.control.seen import seen_of_velocity
+from surgsim.control.tip_energy import MARGIN
 from surgsim.tasks.base import EnergyBudget
+from surgsim.tick.arrays import Resolved, new
+from surgsim.tick.status import GOES_ON
 
 seeds = pytest.mark.parametrize("seed", range(5))
 
@@ -188,3 +193,32 @@ def test_the_resolved_motion_leads_the_measured_tip_by_no_more_than_allowed(velo
         answer, memory = resolver.step(p, memory)
     lead = np.linalg.norm(answer.command.p_WTd - p.kin.p_WT)
     assert lead == pytest.approx(0.002 + p.dt_s * np.linalg.norm(answer.command.v_WTd), rel=0.01)
+
+
+@seeds
+def test_the_kinetic_scale_follows_a_share_of_the_budget_with_its_lag(velocity_problem, seed):
+    """Against the closed form, with the tip's inertia by the constrained inverse of the mass matrix."""
+    arm = usual_arm()
+    p = _problem(velocity_problem, seed, budget=EnergyBudget(most_j=2e-4, f_T=np.zeros(3)), speed=0.05)
+    M, J, v_d = arm.dynamics(p.q, p.v).mass_matrix, p.rcm.jacobian, p.command.v_WTd
+    inverse = np.linalg.inv(M)
+    held = inverse - inverse @ J.T @ np.linalg.inv(J @ inverse @ J.T) @ J @ inverse
+    inertia = np.linalg.inv(p.kin.Jv_WT @ held @ p.kin.Jv_WT.T)
+    covered = np.sqrt(0.25 * 2e-4 / (0.5 * MARGIN * v_d @ inertia @ v_d))
+    assert 1e-3 < covered < 0.9
+    config = PassiveQpConfig(passivity=False, kinetic=True, kinetic_lag_s=0.05, kinetic_share=0.25)
+    resolver = config.build(arm)
+    seen, out = seen_of_velocity(p, arm), new(Resolved, 7)
+    seen["M"], memory = M, np.zeros(resolver.memory_size)
+    for count in range(1, 400):
+        seen["first"] = count == 1
+        assert resolver.kernel(resolver.gains, seen, memory, out) == GOES_ON
+        scale = covered + (1.0 - covered) * (1.0 - p.dt_s / 0.05) ** count
+        np.testing.assert_allclose(p.kin.Jv_WT @ out["qdot"] - out["values"][:3], scale * v_d, atol=1e-9)
+        assert out["values"][4] == 1.0
+
+
+@pytest.mark.parametrize("key", ["kinetic_lag_s", "kinetic_share"])
+def test_a_scale_without_kinetic_is_refused(key):
+    with pytest.raises(ValidationError, match=f"{key} needs kinetic: true"):
+        PassiveQpConfig(**{key: 0.5})

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from surgsim.control.rcm import rcm_kinematics
+from surgsim.control.torque_laws.rcm_elastic_dynamics import RcmElasticDynamicsConfig
 from surgsim.control.torque_laws.rcm_inverse_dynamics import RcmInverseDynamicsConfig
 
 
@@ -31,10 +32,13 @@ def at_rest(arm, torque_problem):
     return make
 
 
-def _acceleration(arm, problem, contact, f_T):
-    """Joint acceleration (7,) of an arm on whose tip `f_T` really acts and is measured."""
-    law = RcmInverseDynamicsConfig(contact=contact).build(arm)
-    p = replace(problem, f_T=f_T)
+def _acceleration(arm, problem, config, f_T):
+    """Joint acceleration (7,) of an arm on whose tip `f_T` really acts and is measured.
+
+    What its joints bear holds it at rest, as the law for elastic drives takes it for at first.
+    """
+    law = config.build(arm)
+    p = replace(problem, f_T=f_T, tau_measured=problem.dyn.bias - f_T @ problem.kin.Jv_WT)
     terms, _ = law.torque(p, law.start(p))
     assert not terms[5].any(), "a limit was met"
     outside = f_T @ p.kin.Jv_WT - p.dyn.bias - arm.damping * p.v
@@ -48,11 +52,15 @@ def _mobility(p):
     return p.kin.Jv_WT @ held @ p.kin.Jv_WT.T
 
 
+@pytest.mark.parametrize("config", [RcmInverseDynamicsConfig, RcmElasticDynamicsConfig])
 @pytest.mark.parametrize("seed", range(4))
-def test_the_tip_accelerates_along_the_force_by_its_own_mobility_and_the_shaft_stays(arm, at_rest, seed):
+def test_the_tip_accelerates_along_the_force_by_its_own_mobility_and_the_shaft_stays(
+    arm, at_rest, seed, config
+):
     p = at_rest(seed)
     force = 0.5 * np.random.default_rng(seed).standard_normal(3)
-    change = _acceleration(arm, p, "yield", force) - _acceleration(arm, p, "yield", np.zeros(3))
+    law = config(contact="yield")
+    change = _acceleration(arm, p, law, force) - _acceleration(arm, p, law, np.zeros(3))
     along = force @ _mobility(p) @ force / (force @ force)
     assert along > 0.01
     np.testing.assert_allclose(p.kin.Jv_WT @ change, along * force, atol=1e-8)
@@ -62,5 +70,6 @@ def test_the_tip_accelerates_along_the_force_by_its_own_mobility_and_the_shaft_s
 def test_without_it_an_unexpected_force_turns_the_shaft(arm, at_rest):
     """What the cancelled share is for: the first tick of `reject`, before the observer has seen the force."""
     p, force = at_rest(1), np.array([0.5, -0.3, 0.4])
-    change = _acceleration(arm, p, "reject", force) - _acceleration(arm, p, "reject", np.zeros(3))
+    law = RcmInverseDynamicsConfig(contact="reject")
+    change = _acceleration(arm, p, law, force) - _acceleration(arm, p, law, np.zeros(3))
     assert np.abs(p.rcm.jacobian @ change).max() > 0.01
