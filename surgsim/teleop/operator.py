@@ -298,7 +298,7 @@ def _begin(
             place += operator.sight.shift[i]
         stays = stays and operator.target[i] == place
         operator.target[i] = place
-    if stays and _distance(operator) <= goal[TOLERANCE]:
+    if stays and (law.sight.use or _distance(operator) <= goal[TOLERANCE]):
         operator.phase, operator.leave_s = DWELL, t_s + law.expected_delay_s + goal[DWELL_TIME]
         return
     _move(law, gains, operator, memory, t_s, mapping)
@@ -318,6 +318,7 @@ def _move(
         change[i] += reach.origin[i]
     width = 2.0 * _goal(law, gains, operator.index)[TOLERANCE] / mapping.scale
     aim(law.reach, reach, change, width, t_s + law.reaction_s, _scatter(law, operator, memory))
+    operator.sight.moves += 1
     operator.phase = MOVE
 
 
@@ -373,14 +374,20 @@ def _decide(
         rests = dot(operator.speed, operator.speed) < law.rest_speed_m_per_s * law.rest_speed_m_per_s
         if t_s < end_s + law.expected_delay_s or not rests:
             return
-        if _distance(operator) <= goal[TOLERANCE]:
+        if _distance(operator) <= goal[TOLERANCE] or _contents_itself(law, operator):
             operator.phase, operator.leave_s = DWELL, t_s + goal[DWELL_TIME]
         else:
             _move(law, gains, operator, memory, t_s, mapping)
     elif t_s >= operator.leave_s and operator.roll == goal[TURNED]:
         _begin(law, gains, operator, memory, _next(law, gains, operator, memory), t_s, mapping)
-    elif goal[PUSH] == 0.0 and _distance(operator) > goal[TOLERANCE]:
+    elif goal[PUSH] == 0.0 and _distance(operator) > goal[TOLERANCE] and not _contents_itself(law, operator):
         _move(law, gains, operator, memory, t_s, mapping)
+
+
+@compiled
+def _contents_itself(law: OperatorLaw, operator: Operator) -> bool:
+    """Whether it has corrected as often as one that looks does, and goes on with what it has reached."""
+    return law.sight.use == 1 and operator.sight.moves > law.sight.corrections
 
 
 @compiled

@@ -14,7 +14,7 @@ import math
 from typing import ClassVar
 
 import numpy as np
-from pydantic import NonNegativeFloat
+from pydantic import NonNegativeFloat, NonNegativeInt
 
 from surgsim.array import Array
 from surgsim.catalog import PartConfig
@@ -48,12 +48,15 @@ class SightConfig(PartConfig):
         across_m: Standard deviation of its aim across the line of sight, along each of two axes [m].
         depth_m: The same along the line of sight [m].
         line_of_sight: Where the endoscope looks, world frame.
+        corrections: How often it corrects a movement; after that it goes on with what it has reached, since
+            the jaws may be on the board.
     """
 
     use: bool = False
     across_m: NonNegativeFloat = 0.0007
-    depth_m: NonNegativeFloat = 0.0014
+    depth_m: NonNegativeFloat = 0.001
     line_of_sight: Vec3 = (0.0, 0.5, -1.0)
+    corrections: NonNegativeInt = 3
 
 
 class SightLaw(Record):
@@ -61,6 +64,7 @@ class SightLaw(Record):
 
     Attributes:
         use: Whether rings are looked at.
+        corrections: How often a movement is corrected.
         rings: How many there are.
         board: Where in the gains the rings' rows begin: middle at first, tip from the middle as grasped,
             middle on the target, and where in the plant's columns its place is (10,) each.
@@ -78,6 +82,7 @@ class SightLaw(Record):
 
     SHAPES: ClassVar[dict[str, str]] = {"origin": "3", "normal": "3", "spread": "3 3"}
     use: int
+    corrections: int
     rings: int
     board: int
     pictures: int
@@ -98,6 +103,7 @@ class Sight(Record):
     Attributes:
         number: The picture that is seen; -1 before the first.
         aimed: Rows of draws used.
+        moves: Movements to the present goal.
         regrasps: How often it has gone back for a ring.
         given_up: Rings given up.
         shift: From a goal's place to where it aims (3,) [m].
@@ -107,6 +113,7 @@ class Sight(Record):
     SHAPES: ClassVar[dict[str, str]] = {"shift": "3", "error": "3"}
     number: int
     aimed: int
+    moves: int
     regrasps: int
     given_up: int
     shift: Array
@@ -124,7 +131,7 @@ _NOT_SHOWN = -1.0
 
 def describe_sight(law: SightLaw, config: SightConfig, layout: PegBoardLayout) -> None:
     """Fill the numbers of eyes and board; the places in gains and memory are the caller's."""
-    law.use, law.rings = config.use, len(layout.source_m)
+    law.use, law.corrections, law.rings = config.use, config.corrections, len(layout.source_m)
     law.width_m = 2.0 * (layout.ring_radius_m + layout.rim_radius_m)
     law.beside_m, law.low_m = layout.hole_radius_m, 0.5 * layout.peg_height_m
     law.origin[:], law.normal[:] = layout.position_m, layout.R_WB[:, 2]
@@ -232,6 +239,7 @@ def is_placed(law: SightLaw, gains: Array, memory: Array, ring: int) -> bool:
 def take_aim(law: SightLaw, gains: Array, sight: Sight, memory: Array, index: int) -> None:
     """Before going to a ring, and before going to its peg: where to, as far as it can be seen."""
     ring, step = index // STEPS, index % STEPS
+    sight.moves = 0
     if step not in (_FIRST, _OVER):
         return
     draw = law.aims + 3 * sight.aimed

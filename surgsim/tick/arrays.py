@@ -575,6 +575,7 @@ class World(Record):
         shaft_end: Site of the shaft's end: the tip's of a straight instrument.
         trocar: Site of the trocar, or -1.
         jaws: Body of the jaws, or -1.
+        hinged: Bodies after it that are jaws on hinges.
         mocap: The port's mocap row, or -1.
         substeps: Physics steps in a control period.
         disturbed: Whether there are parts or a wall.
@@ -683,6 +684,7 @@ class World(Record):
     shaft_end: int
     trocar: int
     jaws: int
+    hinged: int
     mocap: int
     substeps: int
     disturbed: int
