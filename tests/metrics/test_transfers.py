@@ -1,5 +1,6 @@
 """Metrics of a transfer against formulas written another way, on a made trace."""
 
+import itertools
 import math
 
 import numpy as np
@@ -58,11 +59,9 @@ def test_the_way_of_a_helix_is_its_arc_length():
 
 def test_the_shortest_way_visits_the_rings_in_the_order_in_which_they_came_to_rest():
     stops = [(0.1, 0.0, 0.0), (0.03, 0.0, 0.0), (0.03, 0.05, 0.0), (0.01, 0.0, 0.0), (0.01, 0.04, 0.0)]
-    straight = sum(math.dist(a, b) for a, b in zip(stops[:-1], stops[1:], strict=True))
+    straight = sum(math.dist(a, b) for a, b in itertools.pairwise(stops))
     assert shortest_way(made()) == pytest.approx(straight)
-    assert value("economy_of_motion", made()) == pytest.approx(
-        straight / value("tip_path_length_m", made())
-    )
+    assert value("economy_of_motion", made()) == pytest.approx(straight / value("tip_path_length_m", made()))
 
 
 def test_a_tip_that_goes_the_shortest_way_has_an_economy_of_one():

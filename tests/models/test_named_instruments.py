@@ -21,7 +21,7 @@ from surgsim.models.instrument_files import (
 from surgsim.plugins import Offer
 from surgsim.scenario.load import load_scenario
 
-SHIPPED = ["endoscope_0", "endoscope_30", "hook_30"]
+SHIPPED = ["endoscope_0", "endoscope_30", "grasper", "hook_30"]
 
 
 def refused(**keys) -> str:

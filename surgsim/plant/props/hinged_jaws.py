@@ -39,6 +39,7 @@ _SHAFT_M = (0.12, 0.02)  # where the part of the shaft that touches begins and e
 _STEEL = [0.80, 0.82, 0.85, 1.0]
 _TOUCH_N = 0.005
 _SURE_S = 0.05
+_OPENING = 0.95  # jaws that are told to close by less than this share of what they did are opening
 _NET_FORCE = (1 << int(mujoco.mjtConDataField.mjCONDATA_FORCE), 3, 1)  # what a contact sensor gives
 
 
@@ -72,11 +73,13 @@ class Pinch(Record):
         touched: A ring that both touch and that is not said to be held yet, or NOBODY.
         other_s: How long it has been other than `held` says: a held ring not touched by both, or another
             one touched [s].
+        tightest: How far closed the jaws were at most since it is held.
     """
 
     held: int
     touched: int
     other_s: float
+    tightest: float
 
 
 def add_jaws(spec: mujoco.MjSpec, layout: PegBoardLayout, turn_rad: float) -> None:
@@ -179,11 +182,12 @@ def pinch(law: JawsLaw, rings: int, grasp: Pinch, world: World) -> int:
         grasp.held = grasp.touched = NOBODY
         return NOBODY
     if grasp.held != NOBODY:
+        grasp.tightest = max(grasp.tightest, world.jaw)
         touched = squeeze(law, grasp.held, world) > _TOUCH_N
         grasp.other_s = 0.0 if touched else grasp.other_s + world.timestep_s
         if grasp.other_s <= _SURE_S:
             return NOBODY
-        slipped = grasp.held if world.jaw >= law.close_at else NOBODY
+        slipped = grasp.held if world.jaw >= _OPENING * grasp.tightest else NOBODY
         grasp.held = grasp.touched = NOBODY
         return slipped
     between = NOBODY
@@ -193,7 +197,7 @@ def pinch(law: JawsLaw, rings: int, grasp: Pinch, world: World) -> int:
     grasp.other_s = grasp.other_s + world.timestep_s if between == grasp.touched else 0.0
     grasp.touched = between
     if between != NOBODY and world.jaw >= law.close_at and grasp.other_s > _SURE_S:
-        grasp.held, grasp.other_s = between, 0.0
+        grasp.held, grasp.other_s, grasp.tightest = between, 0.0, world.jaw
     return NOBODY
 
 
@@ -206,4 +210,4 @@ def open_hinged(scene: Scene, data: mujoco.MjData) -> None:
 def let_go(pinched: Pinch) -> None:
     """Begin a run: nothing is held."""
     pinched.held = pinched.touched = NOBODY
-    pinched.other_s = 0.0
+    pinched.other_s = pinched.tightest = 0.0

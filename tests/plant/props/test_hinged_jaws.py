@@ -59,7 +59,7 @@ def test_the_jaws_open_close_on_the_rim_and_open_again(carried):
         assert angle[-1] == pytest.approx(OPEN_RAD, abs=1e-3)
     air = held_in_the_air(carried)
     between = carried["jaw_left_rad"][air] + carried["jaw_right_rad"][air]
-    assert np.abs(between).max() < 0.05  # the rim's 2.5 mm keep the two apart by as much as they stand at zero
+    assert np.abs(between).max() < 0.05  # a rim of 2.5 mm is what stands between them at zero
 
 
 def test_squeezing_is_no_force_of_the_surroundings_and_as_strong_as_the_stated_grip(carried):
@@ -107,7 +107,11 @@ def test_what_cannot_be_is_refused(board_scenario):
     scenario = load_scenario(
         "circle_panda",
         controller="rcm_inverse_dynamics",
-        assignments=("theatre=false", "instrument={name: hook_30}", "props=[{type: peg_board, hold: friction}]"),
+        assignments=(
+            "theatre=false",
+            "instrument={name: hook_30}",
+            "props=[{type: peg_board, hold: friction}]",
+        ),
     )
     with pytest.raises(SurgsimError, match="is for the shipped straight instrument"):
         prepare(scenario)
