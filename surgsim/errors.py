@@ -92,6 +92,7 @@ class Outcome(enum.Enum):
     """How a run ended. The value is the sentence that a person reads."""
 
     COMPLETED = "The task ran to its end."
+    TIME_LIMIT = "The task was not done when its time limit passed."
     DIVERGED = "The simulation diverged: a state or torque is not finite."
     JOINT_LIMIT = "A joint left its position range."
     VELOCITY_LIMIT = "A joint moved faster than its velocity limit."

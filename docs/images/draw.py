@@ -49,12 +49,13 @@ _POINTS = 400
 
 
 def scene_stamp(name: str, camera: str) -> str:
-    """What a picture of a scene is made from: scene, start, camera and every asset."""
+    """What a picture of a scene is made from: scene, start, camera and every asset but those of props."""
     each, starts = each_arm(load_experiment(name)), starts_of(name)
     scenes = [one.scene.model_dump_json() for one in each]
     told = [*scenes, camera, *map(_rounded, starts)]
-    assets = sorted(path for path in (tables.ROOT / "assets").rglob("*") if path.is_file())
-    return digest([*told, *(hashlib.sha256(path.read_bytes()).hexdigest() for path in assets)])
+    every = sorted(path for path in (tables.ROOT / "assets").rglob("*") if path.is_file())
+    assets = [path.read_bytes() for path in every if path.parent.name != "props"]
+    return digest([*told, *(hashlib.sha256(content).hexdigest() for content in assets)])
 
 
 def starts_of(name: str) -> list[np.ndarray]:

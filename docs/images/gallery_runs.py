@@ -59,8 +59,15 @@ def stamp(name: str) -> str:
     """What picture and result of a scenario are made from: the scenario, its assets, and the cameras."""
     scenario = load_experiment(name, seed=seed(name))
     robots = {str(one.robot.name) for one in each_arm(scenario)}
-    assets = [told for folder, told in _assets() if folder[0] != "robots" or folder[1] in robots]
+    assets = [told for folder, told in _assets() if _is_used(folder, robots, name)]
     return digest([scenario.sha256(), *_cameras(name), *EXTERNALS.get(name, {}).values(), *assets])
+
+
+def _is_used(folder: tuple[str, ...], robots: set[str], name: str) -> bool:
+    """Whether a scenario is made of the assets of a folder: of its robots', and props' where it has jaws."""
+    if folder[0] == "robots":
+        return folder[1] in robots
+    return folder[0] != "props" or name.startswith("peg_and_ring_friction_")
 
 
 @lru_cache(maxsize=1)

@@ -17,6 +17,7 @@ from surgsim.metrics import (
     stopping,
     teleoperation,
     timing,
+    transfers,
 )
 from surgsim.metrics.metric import Metric, Undefined
 from surgsim.metrics.outside import outside_metrics
@@ -32,6 +33,7 @@ _MODULES = (
     force,
     stopping,
     peg_and_ring,
+    transfers,
     teleoperation,
     operating,
     timing,

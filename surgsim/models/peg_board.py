@@ -92,6 +92,17 @@ class PegBoardLayout(PartConfig):
         return point
 
 
+TRANSFER_STEPS = (
+    "hover_source",
+    "approach",
+    "grasp",
+    "lift",
+    "hover_target",
+    "place",
+    "release",
+    "leave",
+)
+"""Steps of a ring's transfer, in order."""
 _JAWS_ABOVE_RIM_M = 0.0005
 _RING_ABOVE_PEG_M = 0.004
 _PLACE_ABOVE_BOARD_M = 0.002
@@ -142,14 +153,14 @@ def _transfer(layout: PegBoardLayout, ring: int) -> list[TransferGoal]:
     high = low + layout.peg_height_m + _RING_ABOVE_PEG_M
     source, target = np.array(layout.source_m[ring]) + reach, np.array(layout.target_m[ring]) + reach
     steps = (
-        ("hover_source", source, high, 0.0, 0.002, 0.0),
-        ("approach", source, low, 0.0, 0.001, 0.1),
-        ("grasp", source, low, 1.0, 0.001, 0.2),
-        ("lift", source, high, 1.0, 0.002, 0.0),
-        ("hover_target", target, high, 1.0, 0.001, 0.1),
-        ("place", target, low + _PLACE_ABOVE_BOARD_M, 1.0, 0.001, 0.2),
-        ("release", target, low + _PLACE_ABOVE_BOARD_M, 0.0, 0.001, 0.3),
-        ("leave", target, high, 0.0, 0.002, 0.0),
+        (source, high, 0.0, 0.002, 0.0),
+        (source, low, 0.0, 0.001, 0.1),
+        (source, low, 1.0, 0.001, 0.2),
+        (source, high, 1.0, 0.002, 0.0),
+        (target, high, 1.0, 0.001, 0.1),
+        (target, low + _PLACE_ABOVE_BOARD_M, 1.0, 0.001, 0.2),
+        (target, low + _PLACE_ABOVE_BOARD_M, 0.0, 0.001, 0.3),
+        (target, high, 0.0, 0.002, 0.0),
     )
     return [
         TransferGoal(
@@ -160,5 +171,5 @@ def _transfer(layout: PegBoardLayout, ring: int) -> list[TransferGoal]:
             dwell_s=dwell,
             ring=ring,
         )
-        for name, place, height, jaw, tolerance, dwell in steps
+        for name, (place, height, jaw, tolerance, dwell) in zip(TRANSFER_STEPS, steps, strict=True)
     ]

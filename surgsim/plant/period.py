@@ -151,9 +151,11 @@ def end_period(world: World) -> None:
     """The force on the tip is measured, and the time is that of the next tick."""
     if world.touched and world.jaws >= 0:
         mj_rnePostConstraint(world.mj_model, world.mj_data)
-        wrench = doubles(world.cfrc_ext, world.nbody, 6)[world.jaws]
+        wrenches = doubles(world.cfrc_ext, world.nbody, 6)
         for i in range(3):
-            world.f_T[i] = wrench[3 + i]
+            world.f_T[i] = wrenches[world.jaws, 3 + i]
+            for k in range(world.jaws + 1, world.jaws + 1 + world.hinged):
+                world.f_T[i] += wrenches[k, 3 + i]
     world.tick += 1
     world.t_s = world.tick * world.dt_s
 

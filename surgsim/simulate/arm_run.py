@@ -15,10 +15,10 @@ from surgsim.simulate.safety import Guard, SafetyMonitor, is_safe
 from surgsim.simulate.setup import Setup
 from surgsim.simulate.stop import Stop, new_stop
 from surgsim.simulate.ticks import DONE, FAILED, NOT_FINITE, TASK_TOLD, UNSAFE, Run
-from surgsim.tasks.base import TipCommand
+from surgsim.tasks.base import Looks, TipCommand
 from surgsim.tasks.binding import BoundTask
 from surgsim.tasks.command import command_of
-from surgsim.tick.arrays import Control, Record, World, new, point
+from surgsim.tick.arrays import OUT_OF_TIME, Control, Record, World, new, point
 from surgsim.tick.status import TORQUE_RATE
 from surgsim.trace.trace import Ending, Trace, TraceMeta, base_blocks
 
@@ -85,6 +85,7 @@ class ArmRun:
         p.resolver_values = width(controller.columns) - 3 * controller.estimates
         p.clock_every = _CLOCK_EVERY if controller.is_compiled else 1
         self.task.told = run.feedback
+        self._show(run)
         for name in run.at.dtype.names or ():
             run.at[name] = self.rows.begins(name)[0]
         run.rows, run.columns = self.rows.data.ctypes.data, self.rows.data.shape[1]
@@ -92,6 +93,16 @@ class ArmRun:
         point(run.task_gains, self.task.gains)
         point(run.task_memory, self.task.memory)
         return run
+
+    def _show(self, run: Run) -> None:
+        """Let a task that looks at things see the plant's columns."""
+        setup, first = self.setup, 0
+        point(run.feedback.plant, setup.plant.hooks.values)
+        if isinstance(setup.task, Looks):
+            places = {}
+            for block in setup.plant.columns:
+                places[block.name], first = first, first + len(block.columns)
+            setup.task.look_at(places)
 
     @property
     def arguments(self) -> tuple[Run, Control, World, Bore, Guard, Stop, Watch, Hooks]:
@@ -153,13 +164,25 @@ class ArmRun:
         if reason == NOT_FINITE:
             return Ending(outcome=Outcome.DIVERGED, t_s=t_s, detail="torque is not finite")
         if reason == DONE:
-            return Ending(outcome=Outcome.COMPLETED, t_s=t_s)
+            return self.done_at(t_s)
         if reason == TASK_TOLD:
             raise self.task.raised() or _stopped(self.setup.scenario.task.type, status)
         if status == TORQUE_RATE:
             detail = f"the command at {t_s:.3f} s asks for more than robot.drive's torque_rate_nm_per_s"
             return Ending(outcome=Outcome.TORQUE_RATE_LIMIT, t_s=t_s, detail=detail)
         raise self.setup.plant.hooks.raised() or _stopped("a disturbance or prop", status)
+
+    @property
+    def out_of_time(self) -> bool:
+        """Whether the task's time limit has passed before it was done."""
+        return bool(self.setup.controller.control.command.finished == OUT_OF_TIME)
+
+    def done_at(self, t_s: float) -> Ending:
+        """How the run ended that came to its end at `t_s` [s]: completed, or out of time."""
+        if not self.out_of_time:
+            return Ending(outcome=Outcome.COMPLETED, t_s=t_s)
+        detail = f"the task was not done after {t_s:g} s"
+        return Ending(outcome=Outcome.TIME_LIMIT, t_s=t_s, detail=detail)
 
     def limits(self) -> dict[str, list[float]]:
         """Limits of the joints by name, for the trace."""

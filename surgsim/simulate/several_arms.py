@@ -99,6 +99,10 @@ class SeveralArms:
         """How the run ended, with the arm by which it did."""
         told, t_s = self._record, self.arms[0].time_s
         if told.reason == DONE:
+            late = [(name, arm) for name, arm in self._by_name.items() if arm.out_of_time]
+            for name, arm in late:
+                ending = arm.done_at(t_s)
+                return replace(ending, detail=f"arm {name}: {ending.detail}")
             return Ending(outcome=Outcome.COMPLETED, t_s=t_s)
         if told.reason == ARMS_TOUCH:
             found = self._watch.look()

@@ -1,7 +1,7 @@
 """What a task asks of the instrument, and the part that all path tasks share."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar, Protocol, Self, runtime_checkable
 
@@ -196,6 +196,15 @@ class WeighsForce(Protocol):
 
     def force_acted_over(self, time_s: float) -> None:
         """The measured force is the mean over the last `time_s` of the control period [s]: a physics step."""
+        ...
+
+
+@runtime_checkable
+class Looks(Protocol):
+    """A task that looks at things in the patient, and has to know where the plant says where they are."""
+
+    def look_at(self, places: Mapping[str, int]) -> None:
+        """Where each block begins in the plant's columns, which `Feedback.plant` has."""
         ...
 
 

@@ -1,14 +1,15 @@
 """Teleoperation: the tip follows a master console through a delayed channel."""
 
-from collections.abc import Callable, Sequence
+import math
+from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
-from typing import TYPE_CHECKING, Literal, Self
+from typing import TYPE_CHECKING, Annotated, Literal, Self
 
 import numpy as np
 from pydantic import NonNegativeFloat, PositiveFloat, model_validator
 
 from surgsim.array import Array
-from surgsim.catalog import PartConfig, Surroundings
+from surgsim.catalog import ADDED, PartConfig, Surroundings
 from surgsim.columns import width
 from surgsim.compiled import as_parameter
 from surgsim.models.config import Vec3
@@ -37,6 +38,15 @@ from surgsim.teleop.messages import TANK
 from surgsim.teleop.operator import OperatorConfig, describe_operator
 from surgsim.teleop.receiver import ReceiverConfig, expect
 from surgsim.teleop.roll import RollConfig, describe_roll
+from surgsim.teleop.sight import (
+    RING_ROW,
+    SHOWN,
+    SIGHT_COLUMNS,
+    board_rows,
+    describe_sight,
+    picture_size,
+    show_first,
+)
 from surgsim.teleop.tank import fill_tank
 from surgsim.teleop.teleoperator import (
     COLUMNS,
@@ -73,6 +83,8 @@ class TeleoperationConfig(PartConfig):
         board: Layout of the board for `peg_and_ring`; must be that of the `peg_board` in `props`.
         goal_timeout_s: After this the operator gives up a goal of `peg_and_ring` [s].
         duration_s: Longest time that it may take [s].
+        time_limit_s: The operator must be done by then, else the run ends as `time_limit` and the task is not
+            done [s]; null, or past `duration_s`: no limit.
         hold_end_s: Time at rest after the last goal [s].
         bilateral: What either side sends, what the hand feels and where the tip is led: a bilateral scheme.
         operator: Eyes, decisions and hand.
@@ -94,6 +106,7 @@ class TeleoperationConfig(PartConfig):
     board: PegBoardLayout = PegBoardLayout()
     goal_timeout_s: PositiveFloat = 20.0
     duration_s: PositiveFloat = 60.0
+    time_limit_s: Annotated[PositiveFloat | None, ADDED] = None
     hold_end_s: NonNegativeFloat = 1.0
     bilateral: AnyBilateral = PassiveConvexConfig()
     operator: OperatorConfig = OperatorConfig()
@@ -110,6 +123,12 @@ class TeleoperationConfig(PartConfig):
     def _one_program(self) -> Self:
         if self.program == "peg_and_ring" and self.goals:
             raise ValueError("program 'peg_and_ring' makes its own goals: leave goals out")
+        return self
+
+    @model_validator(mode="after")
+    def _there_are_rings_to_look_at(self) -> Self:
+        if self.operator.sight.use and self.program != "peg_and_ring":
+            raise ValueError("operator.sight looks at the rings of the program 'peg_and_ring'")
         return self
 
     @model_validator(mode="after")
@@ -186,7 +205,6 @@ class Teleoperation:
     """
 
     reacts = True
-    columns = COLUMNS
     kernel = staticmethod(teleoperate)
 
     def __init__(
@@ -204,9 +222,12 @@ class Teleoperation:
         self._scheme = config.bilateral.build(period_s, round_trip)
         ends = self._scheme.memory_size if self._scheme else 0
         packets = [(life, copies(channel)) for life, channel in zip(lives, self._channels, strict=True)]
-        self._places = places(packets, ends)
+        self._looks = config.operator.sight.use
+        rings = board_rows(config.board) if self._looks else np.zeros((0, RING_ROW))
+        self.columns = (*COLUMNS, *SIGHT_COLUMNS) if self._looks else COLUMNS
+        self._places = places(packets, ends, picture_size(len(rings)) if self._looks else 0)
         own = self._scheme.gains if self._scheme else np.zeros(0)
-        rows = (goal_rows(self._goals).ravel(), config.mapping.change_rows().ravel())
+        rows = (goal_rows(self._goals).ravel(), config.mapping.change_rows().ravel(), rings.ravel())
         self.gains = np.concatenate([np.zeros(LAW_SIZE), *rows, own])
         self.memory = np.zeros(self._places.end)
         self._describe(lives)
@@ -225,6 +246,14 @@ class Teleoperation:
         """Let `hand` take the simulated operator's place, from the next `reset` on."""
         self._hand = hand
 
+    def look_at(self, places: Mapping[str, int]) -> None:
+        """Where the rings are in the plant's columns."""
+        if not self._looks:
+            return
+        law = laid_over(Law, self.gains).operator.operator.sight
+        for ring in range(law.rings):
+            self.gains[law.board + RING_ROW * ring + SHOWN] = places[f"ring{ring + 1}"]
+
     def force_acted_over(self, time_s: float) -> None:
         """The measured force is of the last `time_s` of each control period [s], of all of it until told."""
         laid_over(Law, self.gains).force_share = time_s / self._period
@@ -234,6 +263,7 @@ class Teleoperation:
         c, law, at = self._c, laid_over(Law, self.gains), self._places
         near, far = law.operator, law.remote
         law.hold_end_s, law.start[:], law.force_share = c.hold_end_s, self._start, 1.0
+        law.time_limit_s = math.inf if c.time_limit_s is None else c.time_limit_s
         for side in (near, far):
             side.period_s = self._period
             take(side.receiver, c.receiver)
@@ -255,6 +285,7 @@ class Teleoperation:
         describe_filter(near.tremor_filter, c.tremor_filter, self._period)
         near.mapping.changes = LAW_SIZE + GOAL * len(self._goals)
         near.operator.clutch.fade_s = c.mapping.clutch_fade_s
+        self._describe_sight(lives[-1])
         lines = (
             (law.forth, far.receiver, at.forth_draws, at.forth_ring, at.forth_taken),
             (law.back, near.receiver, at.back_draws, at.back_ring, at.back_taken),
@@ -270,6 +301,16 @@ class Teleoperation:
             line.capacity = life * copies(config)
             line.cumulative = receiver.cumulative = config.energy == "cumulative"
             receiver.taken, receiver.window = taken, life
+
+    def _describe_sight(self, life: int) -> None:
+        """What the operator sees of the rings, in pictures that live so many periods."""
+        if not self._looks:
+            return
+        law, at = laid_over(Law, self.gains).operator, self._places
+        sight = law.operator.sight
+        describe_sight(sight, self._c.operator.sight, self._c.board)
+        sight.pictures, sight.kept, sight.seen, sight.aims = at.pictures, life, at.seen, at.aims
+        sight.board = law.mapping.changes + self._c.mapping.change_rows().size
 
     def reset(self) -> None:
         """Handle at home, tip at its start, channels empty."""
@@ -291,7 +332,9 @@ class Teleoperation:
             expect(law.operator.screen, near.screen, memory)
         state.work.p[:] = far.reference[:] = self._start
         state.forth.drawn = state.back.drawn = state.video.drawn = DRAWN
-        near.operator.shaken = near.operator.scattered = DRAWN
+        near.operator.shaken = near.operator.scattered = near.operator.sight.aimed = DRAWN
+        if self._looks:
+            show_first(law.operator.operator.sight, self.gains, near.operator.sight, memory, self._start)
         self._random = [np.random.default_rng(_child(self._seed, *key)) for key in _STREAMS]
         self.refill(1)
 
@@ -301,9 +344,10 @@ class Teleoperation:
         operator = state.operator.operator
         used = [state.forth.drawn, state.back.drawn, operator.shaken, operator.scattered]
         used += [state.video.drawn] if self._c.video else []
+        used += [operator.sight.aimed] if self._looks else []
         if DRAWN - max(used) >= ticks:
             return
-        tremor, scatter, *of_channels = self._random
+        tremor, scatter, aims, *of_channels = self._random
         lines = zip(
             (state.forth, state.back, state.video),
             self._channels,
@@ -321,6 +365,9 @@ class Teleoperation:
         def misses(rows: Array) -> None:
             rows[:] = scatter.standard_normal(rows.shape)
 
+        def errs(rows: Array) -> None:
+            rows[:] = aims.standard_normal(rows.shape)
+
         def top_up(begin: int, size: int, used: int, draw: _Draw) -> int:
             left = DRAWN - used
             if left >= ticks:
@@ -334,6 +381,8 @@ class Teleoperation:
             channel.drawn = top_up(begin, DRAW, int(channel.drawn), packets(channel, config, random))
         operator.shaken = top_up(at.tremor, 3, int(operator.shaken), shakes)
         operator.scattered = top_up(at.scatter, 3, int(operator.scattered), misses)
+        if self._looks:
+            operator.sight.aimed = top_up(at.aims, 3, int(operator.sight.aimed), errs)
 
     def act(self) -> None:
         """Let the hand in Python act, in the midst of a period."""
@@ -380,7 +429,7 @@ class Teleoperation:
 
     def values(self) -> Array:
         """Values of `columns` at the last `command`."""
-        values: Array = self._out.values[: width(COLUMNS)].copy()
+        values: Array = self._out.values[: width(self.columns)].copy()
         return values
 
     def finished(self, t_s: float) -> bool:
@@ -390,8 +439,8 @@ class Teleoperation:
 
 
 _Draw = Callable[[Array], None]
-_STREAMS = ((0, 0), (0, 1), (1,), (2,), (3,))
-"""Children of the seed: tremor, scatter, packets to the remote side, back, and of the picture."""
+_STREAMS = ((0, 0), (0, 1), (0, 2), (1,), (2,), (3,))
+"""Children of the seed: tremor, scatter, aim, packets to the remote side, back, and of the picture."""
 
 
 def _child(seed: np.random.SeedSequence, *key: int) -> np.random.SeedSequence:

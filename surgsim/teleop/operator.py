@@ -1,13 +1,13 @@
 """A simulated operator: what the eyes see decides, the hand's impedance acts."""
 
 import math
-from typing import ClassVar, Literal
+from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 from pydantic import NonNegativeFloat, PositiveFloat
 
 from surgsim.array import Array
-from surgsim.catalog import PartConfig
+from surgsim.catalog import ADDED, PartConfig
 from surgsim.compiled import compiled
 from surgsim.teleop.clutch import ClutchConfig, ClutchLaw, leaves_no_room
 from surgsim.teleop.console import ConsoleState
@@ -17,6 +17,16 @@ from surgsim.teleop.impedance import Grip, hand_wrench
 from surgsim.teleop.mapping import Mapping, motion_to_console
 from surgsim.teleop.reach import Reach, ReachConfig, ReachLaw, aim, reach_at
 from surgsim.teleop.roll import turn_grip
+from surgsim.teleop.sight import (
+    STEPS,
+    Sight,
+    SightConfig,
+    SightLaw,
+    goal_after,
+    once_more,
+    see_picture,
+    take_aim,
+)
 from surgsim.teleop.tremor import TremorConfig, resonance, shake
 from surgsim.tick.algebra import dot
 from surgsim.tick.arrays import Record
@@ -33,7 +43,8 @@ class OperatorConfig(PartConfig):
     a movement it waits `expected_delay_s`, the round trip it is used to (`auto`: that of the channels), then
     for the tip on the screen to rest, and only then corrects. Every decision takes `reaction_s`. A goal at
     the place of the one before is for the jaws alone: the hand stays, and waits until it must have seen them
-    act. With a `clutch` it re-indexes the handle where that nears its stop.
+    act. With a `clutch` it re-indexes the handle where that nears its stop. With `sight` it looks at the
+    rings of a peg board, misses some, and grasps again.
     """
 
     reaction_s: NonNegativeFloat = 0.2
@@ -49,6 +60,7 @@ class OperatorConfig(PartConfig):
     reach: ReachConfig = ReachConfig()
     tremor: TremorConfig = TremorConfig()
     clutch: ClutchConfig = ClutchConfig()
+    sight: Annotated[SightConfig, ADDED] = SightConfig()
 
 
 MOVE, WATCH, DWELL, DONE, INDEX = range(5)
@@ -72,6 +84,7 @@ class OperatorLaw(Record):
         grip: The hand's impedance.
         reach: How it reaches.
         clutch: When it re-indexes.
+        sight: What it sees of the rings.
         goals: Where the goals' rows begin in the gains.
         goal_count: How many there are.
         tremor: Where the tremor's noise begins in the memory, a row (3,) [m] for each period.
@@ -90,6 +103,7 @@ class OperatorLaw(Record):
     grip: Grip
     reach: ReachLaw
     clutch: ClutchLaw
+    sight: SightLaw
     goals: int
     goal_count: int
     tremor: int
@@ -111,12 +125,14 @@ class Operator(Record):
         jaw: How far the jaws close.
         roll: How far the hand has turned the grip about its axis [rad].
         reach: The movement.
+        sight: What was seen of the rings.
         seen: The tip as it is taken in (3,) [m].
         speed: Its velocity (3,) [m/s].
         target: Where the tip shall be (3,) [m]; NaN before the first goal.
         upright: Orientation that the hand keeps (3, 3).
         home: Where the handle was at first (3,) [m].
         pedal: Whether it presses the clutch's pedal.
+        picture: Number of the newest picture that has come.
         shake: Displacement by tremor (3,) [m].
         shake_before: The one before it (3,) [m].
     """
@@ -136,6 +152,7 @@ class Operator(Record):
     jaw: float
     roll: float
     reach: Reach
+    sight: Sight
     seen: Array
     speed: Array
     target: Array
@@ -144,6 +161,7 @@ class Operator(Record):
     shake_before: Array
     home: Array
     pedal: int
+    picture: int
 
 
 def describe_operator(
@@ -198,6 +216,8 @@ def operate(
         mapping: What the tip does when the handle moves.
         out: Filled with what the hand does.
     """
+    if law.sight.use:
+        see_picture(law.sight, operator.sight, memory, operator.picture)
     _look(law, gains, operator, memory, t_s, tip, handle, mapping)
     _decide(law, gains, operator, memory, t_s, handle, mapping)
     position, velocity = np.empty(3), np.empty(3)
@@ -270,10 +290,15 @@ def _begin(
         operator.phase = DONE
         return
     goal, stays = _goal(law, gains, index), True
+    if law.sight.use:
+        take_aim(law.sight, gains, operator.sight, memory, index)
     for i in range(3):
-        stays = stays and operator.target[i] == goal[PLACE + i]
-        operator.target[i] = goal[PLACE + i]
-    if stays and _distance(operator) <= goal[TOLERANCE]:
+        place = goal[PLACE + i]
+        if law.sight.use:
+            place += operator.sight.shift[i]
+        stays = stays and operator.target[i] == place
+        operator.target[i] = place
+    if stays and (law.sight.use or _distance(operator) <= goal[TOLERANCE]):
         operator.phase, operator.leave_s = DWELL, t_s + law.expected_delay_s + goal[DWELL_TIME]
         return
     _move(law, gains, operator, memory, t_s, mapping)
@@ -293,6 +318,7 @@ def _move(
         change[i] += reach.origin[i]
     width = 2.0 * _goal(law, gains, operator.index)[TOLERANCE] / mapping.scale
     aim(law.reach, reach, change, width, t_s + law.reaction_s, _scatter(law, operator, memory))
+    operator.sight.moves += 1
     operator.phase = MOVE
 
 
@@ -334,7 +360,7 @@ def _decide(
     end_s = reach.start_s + reach.duration_s
     if t_s - operator.goal_start_s > goal[TIMEOUT]:
         operator.missed += 1
-        _begin(law, gains, operator, memory, operator.index + 1, t_s, mapping)
+        _begin(law, gains, operator, memory, _instead(law, operator, memory), t_s, mapping)
     elif operator.phase == INDEX:
         if t_s >= end_s:
             operator.phase, operator.pedal = WATCH, 0
@@ -348,14 +374,36 @@ def _decide(
         rests = dot(operator.speed, operator.speed) < law.rest_speed_m_per_s * law.rest_speed_m_per_s
         if t_s < end_s + law.expected_delay_s or not rests:
             return
-        if _distance(operator) <= goal[TOLERANCE]:
+        if _distance(operator) <= goal[TOLERANCE] or _contents_itself(law, operator):
             operator.phase, operator.leave_s = DWELL, t_s + goal[DWELL_TIME]
         else:
             _move(law, gains, operator, memory, t_s, mapping)
     elif t_s >= operator.leave_s and operator.roll == goal[TURNED]:
-        _begin(law, gains, operator, memory, operator.index + 1, t_s, mapping)
-    elif goal[PUSH] == 0.0 and _distance(operator) > goal[TOLERANCE]:
+        _begin(law, gains, operator, memory, _next(law, gains, operator, memory), t_s, mapping)
+    elif goal[PUSH] == 0.0 and _distance(operator) > goal[TOLERANCE] and not _contents_itself(law, operator):
         _move(law, gains, operator, memory, t_s, mapping)
+
+
+@compiled
+def _contents_itself(law: OperatorLaw, operator: Operator) -> bool:
+    """Whether it has corrected as often as one that looks does, and goes on with what it has reached."""
+    return law.sight.use == 1 and operator.sight.moves > law.sight.corrections
+
+
+@compiled
+def _next(law: OperatorLaw, gains: Array, operator: Operator, memory: Array) -> int:
+    """The goal after one that was reached."""
+    if law.sight.use:
+        return goal_after(law.sight, gains, operator.sight, memory, operator.index)
+    return operator.index + 1
+
+
+@compiled
+def _instead(law: OperatorLaw, operator: Operator, memory: Array) -> int:
+    """The goal after one that was given up: with sight the ring is sought again."""
+    if law.sight.use:
+        return once_more(law.sight, operator.sight, memory, operator.index // STEPS)
+    return operator.index + 1
 
 
 @compiled

@@ -326,6 +326,7 @@ def step_operator_side(
     if side.in_python:
         status = enter(law.entry)
     else:
+        side.operator.picture = side.screen.highest if law.has_video else side.receiver.highest
         operate(
             law.operator,
             gains,

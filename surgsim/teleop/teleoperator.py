@@ -34,8 +34,9 @@ from surgsim.teleop.remote_side import (
     lead_roll,
     step_remote_side,
 )
+from surgsim.teleop.sight import fill_sight_columns, take_picture
 from surgsim.teleop.tip_work import TipWork, add_tip_work
-from surgsim.tick.arrays import Command, Feedback, Record
+from surgsim.tick.arrays import FINISHED, OUT_OF_TIME, Command, Feedback, Record
 from surgsim.tick.overlay import overlay
 from surgsim.tick.status import GOES_ON
 
@@ -50,6 +51,7 @@ _REMOTE = width(OPERATOR_COLUMNS)
 _ACCOUNT = _REMOTE + width(REMOTE_COLUMNS)
 _ISSUED = _ACCOUNT + width(ACCOUNT_COLUMNS)
 _AGE = _ISSUED + 3
+_SIGHT = _AGE + 1
 DRAWN = 1024
 """So many periods are drawn ahead at most."""
 
@@ -59,6 +61,7 @@ class Law(Record):
 
     Attributes:
         hold_end_s: Time at rest after the operator is done [s].
+        time_limit_s: Time by which it must be done [s]; infinite without a limit.
         force_share: Share of a control period, its last, over which the measured force acted.
         start: The tip's place at first (3,) [m].
         operator: The operator's side.
@@ -71,6 +74,7 @@ class Law(Record):
 
     SHAPES: ClassVar[dict[str, str]] = {"start": "3"}
     hold_end_s: float
+    time_limit_s: float
     force_share: float
     start: Array
     operator: OperatorSideLaw
@@ -125,6 +129,9 @@ class Places(NamedTuple):
         video_draws: To those of the picture.
         tremor: Noise of the tremor (DRAWN, 3) [m].
         scatter: Of the movements (DRAWN, 3).
+        aims: Of the aim (DRAWN, 3); as the next two, nothing where the operator does not look at rings.
+        pictures: Pictures that are kept.
+        seen: The picture that is seen.
         forth_taken: Numbers of the packets that the remote side took.
         back_taken: That the operator's side took.
         video_taken: That the operator's screen took.
@@ -141,6 +148,9 @@ class Places(NamedTuple):
     video_draws: int
     tremor: int
     scatter: int
+    aims: int
+    pictures: int
+    seen: int
     forth_taken: int
     back_taken: int
     video_taken: int
@@ -152,12 +162,19 @@ class Places(NamedTuple):
     end: int
 
 
-def places(packets: Sequence[tuple[int, int]], scheme: int = 0) -> Places:
-    """Places for channels whose packets live so many periods, in so many copies, and for a scheme."""
+def places(packets: Sequence[tuple[int, int]], scheme: int = 0, picture: int = 0) -> Places:
+    """Places for channels whose packets live so many periods, in so many copies, for a scheme and pictures.
+
+    Args:
+        packets: For each channel how many periods a packet may live, and in how many copies.
+        scheme: Numbers of a scheme's end.
+        picture: Numbers of a picture; they come by the last channel.
+    """
     every = (*packets, *[(0, 0)] * (3 - len(packets)))
     sizes = (
         *(DRAW * DRAWN if life else 0 for life, _ in every),
         *(3 * DRAWN, 3 * DRAWN),
+        *((3 * DRAWN, picture * packets[-1][0], picture) if picture else (0, 0, 0)),
         *(life for life, _ in every),
         *(PACKET * life * copied for life, copied in every),
         *(scheme, scheme),
@@ -202,13 +219,17 @@ def teleoperate(gains: Array, feedback: Feedback, memory: Array, out: Command) -
     lead_roll(law.remote, remote, feedback.R_WT, feedback.w_WT)
     if law.remote.passivity == SCHEME:
         state.content[:] = remote.end.content
+    if law.operator.operator.sight.use:
+        take_picture(law.operator.operator.sight, gains, feedback, memory, state.back.next_number)
     send(law.back, state.back, memory, t_s, state.content, energy)
     if law.has_video:
         send(law.video, state.video, memory, t_s, state.content, 0.0)
     if operator.hand.done and not state.is_done:
         state.is_done, state.done_s = 1, t_s
     over = state.ends and state.is_done and t_s >= state.done_s + law.hold_end_s
-    out.finished = 1 if over else 0
+    out.finished = FINISHED if over else 0
+    if state.ends and not state.is_done and t_s >= law.time_limit_s:
+        out.finished = OUT_OF_TIME
     _tell(law, state, feedback, out)
     _record(law, state, t_s, out.values)
     return GOES_ON
@@ -238,3 +259,5 @@ def _record(law: Law, state: State, t_s: float, values: Array) -> None:
     velocity = operator.console.state.velocity
     motion_to_remote(operator.mapping, velocity, values[_ISSUED : _ISSUED + 3])
     values[_AGE] = t_s - remote.receiver.sent_s if remote.receiver.highest >= 0 else math.nan
+    if law.operator.operator.sight.use:
+        fill_sight_columns(operator.operator.sight, values[_SIGHT:])

@@ -27,8 +27,12 @@ A2 = types.float64[:, ::1]
 I1 = types.int64[::1]
 MOST_JOINTS = 8
 """Most joints of an arm; kernels set room aside for them."""
-MOST_VALUES = 64
+MOST_VALUES = 72
 """Most columns that a task or a resolver can add to the trace."""
+
+
+FINISHED, OUT_OF_TIME = 1, 2
+"""What a task says when it is over: nothing is left to do, or its time limit has passed before that."""
 
 
 class Record:
@@ -396,6 +400,7 @@ class Feedback(Record):
         R_WT: Tip orientation (3, 3).
         w_WT: Angular velocity of the instrument (3,) [rad/s].
         f_T: Measured force of the surroundings on the tip (3,) [N].
+        plant: The plant's columns now, for a task that looks at things in the patient; none without a plant.
     """
 
     SHAPES: ClassVar[dict[str, str]] = {"p_WT": "3", "v_WT": "3", "R_WT": "3 3", "w_WT": "3", "f_T": "3"}
@@ -405,6 +410,7 @@ class Feedback(Record):
     R_WT: Array
     w_WT: Array
     f_T: Array
+    plant: Numbers
 
 
 class Command(Record):
@@ -414,7 +420,7 @@ class Command(Record):
         roll_rate: Turn about the shaft [rad/s].
         jaw: How far the jaws close, from 0 to 1.
         budget_j: Energy that the controller may spend [J]; infinite: no limit.
-        finished: 1 where there is nothing left to do.
+        finished: 0 while there is something left to do, `FINISHED`, or `OUT_OF_TIME`.
         p_WTd: Tip position (3,) [m].
         v_WTd: Tip velocity (3,) [m/s].
         a_WTd: Tip acceleration (3,) [m/s^2].
@@ -569,6 +575,7 @@ class World(Record):
         shaft_end: Site of the shaft's end: the tip's of a straight instrument.
         trocar: Site of the trocar, or -1.
         jaws: Body of the jaws, or -1.
+        hinged: Bodies after it that are jaws on hinges.
         mocap: The port's mocap row, or -1.
         substeps: Physics steps in a control period.
         disturbed: Whether there are parts or a wall.
@@ -677,6 +684,7 @@ class World(Record):
     shaft_end: int
     trocar: int
     jaws: int
+    hinged: int
     mocap: int
     substeps: int
     disturbed: int

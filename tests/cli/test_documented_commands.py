@@ -76,6 +76,9 @@ SHORTER = {
     "surgsim compare calibrated_circle_lwr4plus calibrated_circle_panda --seeds 0:10 --out runs/tracked": (
         f"{SHORT} --seeds 0:1"
     ),
+    "surgsim compare peg_and_ring --out runs/peg_and_ring": (
+        f"{SHORT} --set task.time_limit_s=3.0 --seeds 0:1"
+    ),
     "surgsim compare frontier --seeds 0:1 --out runs/frontier": "--controllers rcm_inverse_dynamics",
     "surgsim compare torque_level --out runs/torque_level": "--controllers rcm_inverse_dynamics",
     "surgsim tune joint_impedance --scenario theatre_lwr4plus --budget 60 --out tuned": f"{SHORT} --budget 6",

@@ -97,19 +97,26 @@ def describe_grasp(law: GraspLaw, scene: Scene, data: mujoco.MjData, layout: Peg
     """Fill the places in a model and its data; answers the rings' rows (k, 6)."""
     model = scene.model
     law.ring_radius_m, law.rim_radius_m = layout.ring_radius_m, layout.rim_radius_m
-    law.tip_radius_m = model.geom(TIP_GEOM).size[0]
-    law.jaws, law.load = model.body("jaws").id, model.sensor("jaws_load").adr[0]
     law.rings, law.welds, law.geoms = len(layout.source_m), model.neq, model.ngeom
     law.weld_size = model.eq_data.shape[1]
     law.eq_data, law.eq_active = model.eq_data.ctypes.data, data.eq_active.ctypes.data
     law.geom_conaffinity = model.geom_conaffinity.ctypes.data
     rows = np.zeros((len(layout.source_m), RING))
     for ring, row in enumerate(rows):
-        body, hold = model.body(ring_name(ring)).id, hold_name(ring)
-        row[BODY], row[WELD] = body, model.equality(hold).id
-        row[FORCE], row[DOF] = model.sensor(hold).adr[0], model.joint(ring_name(ring)).dofadr[0]
+        body = model.body(ring_name(ring)).id
+        row[BODY], row[DOF] = body, model.joint(ring_name(ring)).dofadr[0]
         row[FIRST_GEOM], row[GEOMS] = model.body_geomadr[body], model.body_geomnum[body]
     return rows
+
+
+def describe_welds(law: GraspLaw, scene: Scene, rows: Array) -> None:
+    """Fill the places of the welds and of the jaws' sensor, in `rows` (k, 7) too."""
+    model = scene.model
+    law.tip_radius_m = model.geom(TIP_GEOM).size[0]
+    law.jaws, law.load = model.body("jaws").id, model.sensor("jaws_load").adr[0]
+    for ring, row in enumerate(rows):
+        hold = hold_name(ring)
+        row[WELD], row[FORCE] = model.equality(hold).id, model.sensor(hold).adr[0]
 
 
 def open_jaws(law: GraspLaw, rings: Array, grasp: Grasp) -> None:

@@ -1,13 +1,15 @@
 """Peg and ring: rings to be taken from their pegs and put on others."""
 
+import math
 from collections.abc import Mapping
 from typing import Annotated, Any, ClassVar, Literal, Self
 
 import mujoco
 import numpy as np
-from pydantic import Field, NonNegativeFloat, PositiveFloat, model_validator
+from pydantic import Field, FiniteFloat, NonNegativeFloat, PositiveFloat, model_validator
 
 from surgsim.array import Array
+from surgsim.catalog import ADDED
 from surgsim.columns import Block, scalar
 from surgsim.compiled import compiled
 from surgsim.models.build import Scene
@@ -21,14 +23,26 @@ from surgsim.plant.props.grasp import (
     Grasp,
     GraspLaw,
     describe_grasp,
+    describe_welds,
     grip,
     hold_force,
     open_jaws,
     sensed,
 )
+from surgsim.plant.props.hinged_jaws import (
+    JawsLaw,
+    Pinch,
+    add_jaws,
+    describe_jaws,
+    drive_jaws,
+    let_go,
+    open_hinged,
+    pinch,
+    squeeze,
+)
 from surgsim.plant.props.peg_scene import add_board, add_holds, add_rings
 from surgsim.plant.props.ring_state import ELSEWHERE, GRASPED, ON_TARGET, REST_S, add_rest, place_of
-from surgsim.tick.algebra import times
+from surgsim.tick.algebra import norm, times
 from surgsim.tick.arrays import Record, World
 from surgsim.tick.overlay import laid_over, overlay, take
 from surgsim.tick.status import GOES_ON
@@ -45,6 +59,10 @@ class PegBoardConfig(PegBoardLayout):
         close_at: How far closed the jaws catch, from 0 (open) to 1.
         open_at: How far closed they let go again.
         grip_force_n: Force at which a ring slips out of fully closed jaws, in proportion if less closed [N].
+        hold: What holds a ring: a `weld` that gives way at `grip_force_n`, or the `friction` of two hinged
+            jaws that press so hard that it slips at that force; with friction the shaft touches, too.
+        jaws_turn_deg: Turn of the hinged jaws about the shaft; at 0 they close along the instrument's y
+            [deg].
     """
 
     type: Literal["peg_board"] = "peg_board"
@@ -52,11 +70,15 @@ class PegBoardConfig(PegBoardLayout):
     close_at: Jaw = 0.5
     open_at: Jaw = 0.3
     grip_force_n: NonNegativeFloat = 3.0
+    hold: Annotated[Literal["weld", "friction"], ADDED] = "weld"
+    jaws_turn_deg: Annotated[FiniteFloat, ADDED] = 0.0
 
     @model_validator(mode="after")
     def _opens_after_closing(self) -> Self:
         if self.open_at > self.close_at:
             raise ValueError(f"open_at {self.open_at:g} must not be above close_at {self.close_at:g}")
+        if self.hold == "weld" and self.jaws_turn_deg:
+            raise ValueError("jaws_turn_deg turns hinged jaws: it needs hold 'friction'")
         return self
 
     def build(self, rng: np.random.Generator) -> "PegBoard":
@@ -73,6 +95,8 @@ class Board(Record):
         origin: Of the board (3,) [m].
         R_BW: World in the board's frame (3, 3).
         grasp: Of the jaws.
+        hinged: Whether they are on hinges, and hold by friction.
+        jaws: Of those on hinges.
     """
 
     SHAPES: ClassVar[dict[str, str]] = {"origin": "3", "R_BW": "3 3"}
@@ -81,6 +105,8 @@ class Board(Record):
     origin: Array
     R_BW: Array
     grasp: GraspLaw
+    hinged: int
+    jaws: JawsLaw
 
 
 class Handled(Record):
@@ -89,15 +115,33 @@ class Handled(Record):
     Attributes:
         drops: Rings dropped.
         grasp: The jaws' hold.
+        pinch: That of jaws on hinges.
     """
 
     drops: int
     grasp: Grasp
+    pinch: Pinch
 
 
 BOARD, BOARD_SIZE = overlay(Board)
 HANDLED, HANDLED_SIZE = overlay(Handled)
 _STATE, _REST, _LET_GO, _ROW = range(4)
+
+
+@compiled
+def _held(board: Board, seen: Handled) -> int:
+    """The ring in the jaws, or NOBODY."""
+    held: int = seen.pinch.held if board.hinged else seen.grasp.held
+    return held
+
+
+@compiled
+def _hold(board: Board, rings: Array, seen: Handled, world: World) -> int:
+    """Catch, hold or let go; the ring that slipped, or NOBODY."""
+    if board.hinged:
+        drive_jaws(board.jaws, world)
+        return pinch(board.jaws, board.grasp.rings, seen.pinch, world)
+    return grip(board.grasp, rings, seen.grasp, world)
 
 
 @compiled
@@ -107,26 +151,28 @@ def handle_rings(gains: Array, world: World, memory: Array, out: Array) -> int:
     A ring that was let go and rests on no peg was dropped, as was one that slipped.
     """
     board, seen = gains[:BOARD_SIZE].view(BOARD)[0], memory[:HANDLED_SIZE].view(HANDLED)[0]
-    count, grasp = board.grasp.rings, seen.grasp
+    count = board.grasp.rings
     end = BOARD_SIZE + RING * count
     rings, pegs = gains[BOARD_SIZE:end].reshape(-1, RING), gains[end:].reshape(-1, 2)
     rows = memory[HANDLED_SIZE:].reshape(-1, _ROW)
-    before = grasp.held
-    if grip(board.grasp, rings, grasp, world) != NOBODY:
+    before = _held(board, seen)
+    slipped = _hold(board, rings, seen, world)
+    in_jaws = _held(board, seen)
+    if slipped != NOBODY:
         seen.drops += 1
-    elif before != NOBODY and grasp.held == NOBODY:
+    elif before != NOBODY and in_jaws == NOBODY:
         rows[before, _LET_GO] = 1.0
-    if grasp.held != NOBODY:
-        rows[grasp.held, _LET_GO] = 0.0
+    if in_jaws != NOBODY:
+        rows[in_jaws, _LET_GO] = 0.0
     away, p = np.empty(3), np.empty(3)
     for i in range(count):
         row, place = rows[i], body_place(world, int(rings[i, BODY]))
         twist = vector(world.qvel + 8 * int(rings[i, DOF]), 6)
-        row[_REST] = add_rest(row[_REST], twist, i == grasp.held, world.timestep_s)
+        row[_REST] = add_rest(row[_REST], twist, i == in_jaws, world.timestep_s)
         for k in range(3):
             away[k] = place[k] - board.origin[k]
         times(board.R_BW, away, p)
-        held = i == grasp.held
+        held = i == in_jaws
         row[_STATE] = GRASPED if held else place_of(p, row[_REST], pegs, board.beside, board.below)
         if row[_LET_GO] == 1.0 and row[_REST] > REST_S:
             row[_LET_GO] = 0.0
@@ -137,7 +183,7 @@ def handle_rings(gains: Array, world: World, memory: Array, out: Array) -> int:
 
 @compiled
 def count_rings(gains: Array, world: World, memory: Array, out: Array) -> int:
-    """States, rings on targets, drops, force on the jaws, force of the hold."""
+    """States, rings on targets, drops, force on the jaws, force of the hold, of hinged jaws on the shaft."""
     board, seen = gains[:BOARD_SIZE].view(BOARD)[0], memory[:HANDLED_SIZE].view(HANDLED)[0]
     count, rows = board.grasp.rings, memory[HANDLED_SIZE:].reshape(-1, _ROW)
     rings = gains[BOARD_SIZE : BOARD_SIZE + RING * count].reshape(-1, RING)
@@ -146,6 +192,12 @@ def count_rings(gains: Array, world: World, memory: Array, out: Array) -> int:
         out[i] = rows[i, _STATE]
         on_target += rows[i, _STATE] == ON_TARGET
     out[count], out[count + 1] = on_target, seen.drops
+    if board.hinged:
+        held = seen.pinch.held
+        out[count + 2] = norm(world.f_T)
+        out[count + 3] = squeeze(board.jaws, held, world) if held != NOBODY else 0.0
+        out[count + 4] = sensed(world, board.jaws.shaft)
+        return GOES_ON
     out[count + 2], out[count + 3] = sensed(world, board.grasp.load), hold_force(rings, seen.grasp, world)
     return GOES_ON
 
@@ -169,16 +221,20 @@ class PegBoard(Prop):
             scalar("ring_drop_count"),
             scalar("jaws_load", "n"),
             scalar("grip_force", "n"),
+            *((scalar("shaft_load", "n"),) if config.hold == "friction" else ()),
         )
         pegs = np.array([*config.source_m, *config.target_m])
         self.gains = np.concatenate([np.zeros(BOARD_SIZE + RING * count), pegs.ravel()])
         self.memory = np.zeros(HANDLED_SIZE + _ROW * count)
 
     def modify(self, spec: mujoco.MjSpec) -> None:
-        """Add board, rings and the welds that hold them."""
+        """Add board, rings and what holds them: welds, or jaws on hinges."""
         add_board(spec, self._c)
         add_rings(spec, self._c)
-        add_holds(spec, self._c)
+        if self._c.hold == "friction":
+            add_jaws(spec, self._c, math.radians(self._c.jaws_turn_deg))
+        else:
+            add_holds(spec, self._c)
 
     def start(self, scene: Scene, data: mujoco.MjData, rng: np.random.Generator, dt_s: float) -> None:
         """All rings on their sources, jaws open."""
@@ -186,7 +242,16 @@ class PegBoard(Prop):
         board.beside, board.below = c.hole_radius_m, 0.5 * c.peg_height_m
         board.origin[:], board.R_BW[:] = c.position_m, c.R_WB.T
         take(board.grasp, c)
+        take(board.jaws, c)
+        board.hinged = c.hold == "friction"
+        if board.hinged:
+            describe_jaws(board.jaws, scene, c.grip_force_n)
+            open_hinged(scene, data)
         rings = describe_grasp(board.grasp, scene, data, c)
+        if not board.hinged:
+            describe_welds(board.grasp, scene, rings)
         self.gains[BOARD_SIZE : BOARD_SIZE + rings.size] = rings.ravel()
         self.memory[:] = 0.0
-        open_jaws(board.grasp, rings, seen.grasp)
+        let_go(seen.pinch)
+        if not board.hinged:
+            open_jaws(board.grasp, rings, seen.grasp)
