@@ -1,7 +1,7 @@
 """Jaws on hinges that hold a ring by friction alone, and a shaft that touches.
 
-They take the place of the instrument's drawn jaws: those of `assets/props/hinged_jaws.xml`. A drive leads each
-to
+They take the place of the instrument's drawn jaws: those of `assets/props/hinged_jaws.xml`. A drive leads
+each to
 
     q_d = open (1 - jaw) - past jaw,     tau = K (q_d - q), cut at tau_max
 
