@@ -17,7 +17,7 @@ NEXT = {
     "": list(COMMANDS),
     "re": ["report", "reproduce"],
     "run circle_": ["circle_fr3", "circle_iiwa14", "circle_lwr4plus", "circle_panda"],
-    "run safety/t": ["safety/tip_limit", "safety/torque_rate_limit"],
+    "run safety/t": ["safety/time_limit", "safety/tip_limit", "safety/torque_rate_limit"],
     "run circle_panda --co": ["--controller"],
     "run circle_panda --controller p": [
         "passive_convex",
