@@ -110,7 +110,7 @@ def describe_grasp(law: GraspLaw, scene: Scene, data: mujoco.MjData, layout: Peg
 
 
 def describe_welds(law: GraspLaw, scene: Scene, rows: Array) -> None:
-    """Fill the places of the welds and of the jaws' sensor, in `rows` (k, 7) too."""
+    """Fill the places of the welds and of the jaws' sensor, in the welds' rows of numbers too."""
     model = scene.model
     law.tip_radius_m = model.geom(TIP_GEOM).size[0]
     law.jaws, law.load = model.body("jaws").id, model.sensor("jaws_load").adr[0]
