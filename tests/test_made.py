@@ -103,6 +103,11 @@ def test_the_picture_of_the_theatres_errors_is_that_of_the_results(made):
     assert stamped(draw.HERE / "theatre_errors.png") == draw.errors_stamp(), AGAIN
 
 
+def test_the_picture_of_peg_and_ring_is_that_of_the_results(made):
+    draw, _ = made
+    assert stamped(draw.HERE / "peg_and_ring.png") == draw.peg_and_ring_stamp(), AGAIN
+
+
 def test_the_diagrams_are_those_of_their_script(made):
     concepts = importlib.import_module("concepts")
     for file in concepts.DIAGRAMS:

@@ -22,6 +22,7 @@ from stamps import digest, mark, save
 from surgsim.errors import SurgsimError
 from surgsim.models.arm import ArmModel
 from surgsim.models.picture import render
+from surgsim.protocol.figures import share
 from surgsim.report.write import write_report
 from surgsim.scenario.arms import drawn_scenes, each_arm
 from surgsim.scenario.load import load_experiment, load_scenario
@@ -39,7 +40,7 @@ SCENES = {
 }
 MOVING = {
     "theatre.gif": ("theatre_panda", "rcm_elastic_dynamics", "overview,inside", "2"),
-    "rings.gif": ("peg_and_ring_panda", "passive_convex", "inside,endoscope", "8"),
+    "rings.gif": ("peg_and_ring_friction_panda", "passive_kinetic", "inside,endoscope", "8"),
     "endoscope.gif": ("endoscope_and_tool_panda", "rcm_inverse_dynamics", "overview,lens", "4"),
 }
 """Scenario, controller, cameras and speed of each moving picture."""
@@ -167,6 +168,40 @@ def draw_errors() -> None:
         save(image, path, errors_stamp())
 
 
+def draw_peg_and_ring() -> None:
+    """Draw success, rings and missed grasps of the suite `peg_and_ring` over the delay."""
+    path, rows = HERE / "peg_and_ring.png", tables.peg_and_ring()
+    delays = [level for level, _ in rows]
+    success = [share([row["transfer_success"] == 1.0 for row in of]) for _, of in rows]
+    each = (
+        ("rings on their pegs, of 3", "rings_transferred", BLUE),
+        ("grasps missed", "grasps_missed", ORANGE),
+    )
+    title = "Three rings within 300 s, 20 seeds at each delay"
+    with figure(path, title, 1, 3, size=(10.5, 3.4)) as axes:
+        shares = np.array([[one.value, one.low, one.high] for one in success], dtype=float)
+        bars = np.abs(shares[:, 1:] - shares[:, :1]).T
+        axes[0, 0].errorbar(delays, shares[:, 0], yerr=bars, fmt="o-", color=GREEN, capsize=4)
+        axes[0, 0].set(ylim=(-0.05, 1.05), ylabel="success, share with Wilson interval")
+        for ax, (label, metric, color) in zip(axes[0, 1:], each, strict=True):
+            for level, of in rows:
+                values = [row[metric] for row in of]
+                spread = level + np.linspace(-25.0, 25.0, len(values))
+                ax.plot(spread, values, "o", color=color, ms=4, alpha=0.5)
+            ax.plot(delays, [np.mean([row[metric] for row in of]) for _, of in rows], "-", color=color)
+            ax.set(ylabel=f"{label}, each run and mean")
+        for ax in axes.flat:
+            ax.set(xlabel="delay, one way [ms]", xticks=delays)
+    with Image.open(path) as image:
+        image.load()
+        save(image, path, peg_and_ring_stamp())
+
+
+def peg_and_ring_stamp() -> str:
+    """What that picture is made from: the rows."""
+    return digest([(tables.RESULTS / "peg_and_ring" / "runs.csv.sha256").read_text(encoding="utf-8")])
+
+
 def draw_paths() -> None:
     """Draw the paths of the shipped scenarios: circle and sinusoid from above, the spiral from the side."""
     path = HERE / "paths.png"
@@ -192,6 +227,7 @@ def main() -> int:
     tables.main()
     draw_paths()
     draw_errors()
+    draw_peg_and_ring()
     concepts.main()
     for folder in sorted(path.parent for path in tables.RESULTS.glob("*/runs.csv")):
         print(write_report(folder))

@@ -18,6 +18,7 @@ from ruamel.yaml import YAML
 
 from surgsim.compare.observations import Observations
 from surgsim.compare.table import read_table
+from surgsim.protocol.figures import share
 from surgsim.report.axes import sweeps_of
 from surgsim.report.failing import along, at_level
 from surgsim.report.results import read_results
@@ -315,6 +316,40 @@ def _nominal() -> str:
     return by_scenario("nominal", "vprnn", columns)
 
 
+def peg_and_ring() -> list[tuple[float, Rows]]:
+    """Runs of the suite `peg_and_ring` by the delay of the channel, one way [ms]."""
+    rows = rows_of("peg_and_ring")
+    return [
+        (level, [row for row in rows if levels(row)["delay"] == level])
+        for level in sorted({levels(row)["delay"] for row in rows})
+    ]
+
+
+def _peg_and_ring() -> str:
+    """A row for each delay: success with its interval, then means over all runs."""
+    columns = {
+        "rings of 3": "rings_transferred",
+        "time [s]": "run_time_s",
+        "grasps missed": "grasps_missed",
+        "drops": "ring_drops",
+        "way of the tip [m]": "tip_path_length_m",
+        "economy": "economy_of_motion",
+        "`sparc`": "sparc",
+        "force on the jaws, largest [N]": "peg_contact_force_max_n",
+        "on the shaft": "shaft_contact_force_max_n",
+    }
+    lines = []
+    for level, rows in peg_and_ring():
+        done = share([row["transfer_success"] == 1.0 for row in rows])
+        hits = sum(row["transfer_success"] == 1.0 for row in rows)
+        told = f"{hits} of {len(rows)} ({done.low:.2f} to {done.high:.2f})"
+        values = {
+            metric: [row[metric] for row in rows if row[metric] is not None] for metric in columns.values()
+        }
+        lines.append([f"{level:g} ms", told, *(f"{np.mean(v):.3g}" if v else "–" for v in values.values())])
+    return table(["delay, one way", "success", *columns], lines)
+
+
 RCM = (("RCM RMS", "rcm_error_rms_mm"), ("RCM max", "rcm_error_max_mm"))
 FORCE = (("force RMS [N]", "trocar_force_rms_n"), ("max [N]", "trocar_force_max_n"))
 VERDICTS = ("holds", "depends", "does not hold", "not comparable")
@@ -350,6 +385,7 @@ TABLES: dict[str, Callable[[], str]] = {
     "protocol": _protocol,
     "theatre_short": _theatre_short,
     "baselines": _baselines,
+    "peg_and_ring": _peg_and_ring,
     "robustness": _robustness,
     "drives_arms": _drives_arms,
     "drives_levels": _drives_levels,
