@@ -40,7 +40,7 @@ SCENES = {
 }
 MOVING = {
     "theatre.gif": ("theatre_panda", "rcm_elastic_dynamics", "overview,inside", "2"),
-    "rings.gif": ("peg_and_ring_friction_panda", "passive_kinetic", "inside,endoscope", "8"),
+    "rings.gif": ("peg_and_ring_panda", "passive_convex", "inside,endoscope", "8"),
     "endoscope.gif": ("endoscope_and_tool_panda", "rcm_inverse_dynamics", "overview,lens", "4"),
 }
 """Scenario, controller, cameras and speed of each moving picture."""
