@@ -174,22 +174,22 @@ def draw_peg_and_ring() -> None:
     delays = [level for level, _ in rows]
     success = [share([row["transfer_success"] == 1.0 for row in of]) for _, of in rows]
     each = (
-        ("rings on their pegs, of 3", "rings_transferred", BLUE),
+        ("rings on their pegs", "rings_transferred", BLUE),
         ("grasps missed", "grasps_missed", ORANGE),
     )
-    title = "Three rings within 300 s, 20 seeds at each delay"
+    title = "Three rings within 300 s, 20 seeds at each delay; lines are means"
     with figure(path, title, 1, 3, size=(10.5, 3.4)) as axes:
         shares = np.array([[one.value, one.low, one.high] for one in success], dtype=float)
         bars = np.abs(shares[:, 1:] - shares[:, :1]).T
         axes[0, 0].errorbar(delays, shares[:, 0], yerr=bars, fmt="o-", color=GREEN, capsize=4)
-        axes[0, 0].set(ylim=(-0.05, 1.05), ylabel="success, share with Wilson interval")
+        axes[0, 0].set(ylim=(-0.05, 1.05), ylabel="success (Wilson interval)")
         for ax, (label, metric, color) in zip(axes[0, 1:], each, strict=True):
             for level, of in rows:
                 values = [row[metric] for row in of]
                 spread = level + np.linspace(-25.0, 25.0, len(values))
                 ax.plot(spread, values, "o", color=color, ms=4, alpha=0.5)
             ax.plot(delays, [np.mean([row[metric] for row in of]) for _, of in rows], "-", color=color)
-            ax.set(ylabel=f"{label}, each run and mean")
+            ax.set(ylabel=label)
         for ax in axes.flat:
             ax.set(xlabel="delay, one way [ms]", xticks=delays)
     with Image.open(path) as image:
