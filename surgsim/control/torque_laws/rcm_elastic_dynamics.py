@@ -14,12 +14,11 @@ from surgsim.control.torque_laws.rcm_hierarchy import (
     HIERARCHY_GAINS,
     LIMITS,
     TERMS,
-    YIELDS,
     fill_terms,
+    fill_touch,
     hierarchy_gains,
 )
 from surgsim.models.arm import ArmModel
-from surgsim.tick.algebra import transposed_times
 from surgsim.tick.arrays import Seen
 from surgsim.tick.scratch import scratch
 from surgsim.tick.status import GOES_ON, INFEASIBLE
@@ -89,9 +88,7 @@ def rcm_elastic_dynamics(gains: Array, seen: Seen, memory: Array, out: Array) ->
     perturbation, Spong, Khorasani and Kokotovic, IEEE J. Robotics and Automation 3:294 (1987).
     """
     numbers, d, touch = gains[HIERARCHY_GAINS:], scratch(seen.q.size), scratch(seen.q.size)
-    touch[:] = 0.0
-    if gains[YIELDS] != 0.0:
-        transposed_times(seen.Jv_WT, seen.f_T, touch)
+    fill_touch(gains, seen, touch)
     status = look_ahead(numbers, seen, memory, touch, d)
     if status != GOES_ON:
         return status

@@ -104,6 +104,14 @@ def _task_accelerations(
 
 
 @compiled
+def fill_touch(gains: Array, seen: Seen, touch: Array) -> None:
+    """Torque J_T' f of the measured force on the tip that is yielded to (n,) [N m]; 0 where none is."""
+    touch[:] = 0.0
+    if gains[YIELDS] != 0.0:
+        transposed_times(seen.Jv_WT, seen.f_T, touch)
+
+
+@compiled
 def _give_way(inertia: Array, f: Array, a: Array) -> bool:
     """Add to `a` the acceleration of the tip along the force `f` on it, its inertia (3, 3) [kg] destroyed."""
     size, moved = dot(f, f), scratch(3)

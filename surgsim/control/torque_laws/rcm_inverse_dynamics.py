@@ -16,10 +16,10 @@ from surgsim.control.observer import (
     torque_offset,
 )
 from surgsim.control.torque_laws.base import KernelTorqueLaw
-from surgsim.control.torque_laws.rcm_hierarchy import HIERARCHY_GAINS, TERMS, YIELDS, fill_terms
+from surgsim.control.torque_laws.rcm_hierarchy import HIERARCHY_GAINS, TERMS, fill_terms, fill_touch
 from surgsim.control.torque_laws.rcm_tasks import RcmTasksConfig
 from surgsim.models.arm import ArmModel
-from surgsim.tick.algebra import back_substitute, factor, transposed_times
+from surgsim.tick.algebra import back_substitute, factor
 from surgsim.tick.arrays import Seen
 from surgsim.tick.nominal import copy_model, dynamics, kinematics
 from surgsim.tick.scratch import scratch, scratch_matrix
@@ -131,9 +131,7 @@ def rcm_inverse_dynamics(gains: Array, seen: Seen, memory: Array, out: Array) ->
     """
     n, most = seen.q.size, int(gains[MOST_DELAY])
     touch, tau, d = scratch(n), scratch(n), scratch(n)
-    touch[:] = 0.0
-    if gains[YIELDS] != 0.0:
-        transposed_times(seen.Jv_WT, seen.f_T, touch)
+    fill_touch(gains, seen, touch)
     late = foresee(gains[HIERARCHY_GAINS:], seen, memory, touch, d)
     if late < 0.0:
         return RANK_LOST
