@@ -16,12 +16,12 @@ GRASPED, ON_TARGET = 1.0, 2.0
 """Values of the columns `ring_state_{1..n}`."""
 
 
-def _of_board(compute: Callable[[Trace], float]) -> Callable[[Trace], float]:
-    """`compute`, for traces with a peg board."""
-    return with_block("ring_state", compute)
+def of_board(compute: Callable[[Trace], float], rows: int = 1) -> Callable[[Trace], float]:
+    """`compute`, for traces with a peg board and at least so many rows."""
+    return with_block("ring_state", compute, rows)
 
 
-def _at_end(trace: Trace) -> NDArray[np.bool_]:
+def at_end(trace: Trace) -> NDArray[np.bool_]:
     """Which rings are on a target at the end."""
     found: NDArray[np.bool_] = trace.block("ring_state")[-1] == ON_TARGET
     return found
@@ -29,18 +29,18 @@ def _at_end(trace: Trace) -> NDArray[np.bool_]:
 
 def rings_transferred(trace: Trace) -> float:
     """Rings that rest on a target peg at the end."""
-    return float(np.count_nonzero(_at_end(trace)))
+    return float(np.count_nonzero(at_end(trace)))
 
 
 def rings_transferred_fraction(trace: Trace) -> float:
     """The same over the number of rings."""
-    return float(np.mean(_at_end(trace)))
+    return float(np.mean(at_end(trace)))
 
 
 def transfer_time_s(trace: Trace) -> float:
     """Mean time from a ring's first grasp until it rests on its target for good [s]; NaN if none does."""
     states, times = trace.block("ring_state"), []
-    for ring in np.flatnonzero(_at_end(trace)):
+    for ring in np.flatnonzero(at_end(trace)):
         grasped = np.flatnonzero(states[:, ring] == GRASPED)
         away = np.flatnonzero(states[:, ring] != ON_TARGET)
         if grasped.size:
@@ -63,14 +63,14 @@ METRICS = (
         name="rings_transferred",
         heading="rings transferred",
         meaning="rings that rest on a target peg at the end",
-        compute=_of_board(rings_transferred),
+        compute=of_board(rings_transferred),
         lower_is_better=False,
     ),
     Metric(
         name="rings_transferred_fraction",
         heading="rings transferred, share",
         meaning="the same over the number of rings",
-        compute=_of_board(rings_transferred_fraction),
+        compute=of_board(rings_transferred_fraction),
         lower_is_better=False,
     ),
     Metric(
@@ -79,13 +79,13 @@ METRICS = (
         matters=0.1,
         matters_source=PEG_TRANSFER_SECOND,
         meaning="mean time from a ring's first grasp until it rests on its target peg",
-        compute=_of_board(transfer_time_s),
+        compute=of_board(transfer_time_s),
     ),
     Metric(
         name="ring_drops",
         heading="rings dropped",
         meaning="rings that slipped out of the jaws, or were let go and came to rest on no peg",
-        compute=_of_board(ring_drops),
+        compute=of_board(ring_drops),
     ),
     Metric(
         name="peg_contact_force_max_n",
@@ -93,6 +93,6 @@ METRICS = (
         matters=0.05,
         matters_source=FORCE_RESOLUTION,
         meaning="largest force of board, pegs and rings on the jaws",
-        compute=_of_board(peg_contact_force_max_n),
+        compute=of_board(peg_contact_force_max_n),
     ),
 )

@@ -4,26 +4,19 @@ How smooth the tip moved is `sparc`. Undefined (NaN) for a trace without a peg b
 """
 
 import math
-from collections.abc import Callable
 
 import numpy as np
 
 from surgsim.array import Array
 from surgsim.errors import Outcome
 from surgsim.metrics.metric import CHOICE, FORCE_RESOLUTION, PEG_TRANSFER_SECOND, Metric, with_block
-from surgsim.metrics.peg_and_ring import GRASPED, ON_TARGET
+from surgsim.metrics.peg_and_ring import GRASPED, ON_TARGET, at_end, of_board
 from surgsim.trace.trace import Trace
-
-
-def _of_board(compute: Callable[[Trace], float], rows: int = 1) -> Callable[[Trace], float]:
-    """`compute`, for traces with a peg board."""
-    return with_block("ring_state", compute, rows)
 
 
 def transfer_success(trace: Trace) -> float:
     """1 if the run came to its end within its time limit with every ring on a target peg, else 0."""
-    done = trace.meta.ending.outcome is Outcome.COMPLETED
-    return float(done and bool((trace.block("ring_state")[-1] == ON_TARGET).all()))
+    return float(trace.meta.ending.outcome is Outcome.COMPLETED and bool(at_end(trace).all()))
 
 
 def _board(trace: Trace) -> dict[str, float]:
@@ -63,7 +56,7 @@ def shortest_way(trace: Trace) -> float:
     Of the rings on a target at the end, in the order in which they came to rest there; NaN without one.
     """
     states = trace.block("ring_state")
-    rings = np.flatnonzero(states[-1] == ON_TARGET)
+    rings = np.flatnonzero(at_end(trace))
     if not rings.size:
         return math.nan
     since = [int(np.flatnonzero(np.append(-1.0, states[:, ring]) != ON_TARGET)[-1]) for ring in rings]
@@ -84,14 +77,14 @@ METRICS = (
         name="transfer_success",
         heading="all rings transferred in time",
         meaning="1 if all rings rest on target pegs within the time limit, else 0",
-        compute=_of_board(transfer_success),
+        compute=of_board(transfer_success),
         lower_is_better=False,
     ),
     Metric(
         name="grasps_missed",
         heading="grasps missed",
         meaning="times that the jaws closed and opened again without a ring",
-        compute=_of_board(grasps_missed),
+        compute=of_board(grasps_missed),
     ),
     Metric(
         name="tip_path_length_m",
@@ -99,7 +92,7 @@ METRICS = (
         matters=0.01,
         matters_source=CHOICE,
         meaning="length of the tip's way, of a run with a peg board",
-        compute=_of_board(tip_path_length, rows=2),
+        compute=of_board(tip_path_length, rows=2),
     ),
     Metric(
         name="economy_of_motion",
@@ -107,7 +100,7 @@ METRICS = (
         matters=0.01,
         matters_source=CHOICE,
         meaning="straight way from ring to peg and on over the way that the tip went",
-        compute=_of_board(economy_of_motion, rows=2),
+        compute=of_board(economy_of_motion, rows=2),
         lower_is_better=False,
     ),
     Metric(
@@ -116,7 +109,7 @@ METRICS = (
         matters=0.1,
         matters_source=PEG_TRANSFER_SECOND,
         meaning="time that a run with a peg board took, cut off by the time limit",
-        compute=_of_board(lambda trace: float(trace["t_s"][-1])),
+        compute=of_board(lambda trace: float(trace["t_s"][-1])),
     ),
     Metric(
         name="shaft_contact_force_max_n",

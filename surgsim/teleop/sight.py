@@ -155,8 +155,9 @@ def board_rows(layout: PegBoardLayout) -> Array:
     return rows
 
 
+@compiled
 def picture_size(rings: int) -> int:
-    """Numbers of a picture."""
+    """Numbers of a picture: tip, then the rings."""
     return 3 + 3 * rings
 
 
@@ -164,7 +165,7 @@ def picture_size(rings: int) -> int:
 def take_picture(law: SightLaw, gains: Array, feedback: Feedback, memory: Array, number: int) -> None:
     """Keep what the endoscope sees now as the picture `number`."""
     plant = feedback.plant
-    at = law.pictures + (3 + 3 * law.rings) * (number % law.kept)
+    at = law.pictures + picture_size(law.rings) * (number % law.kept)
     for i in range(3):
         memory[at + i] = feedback.p_WT[i]
     for ring in range(law.rings):
@@ -182,7 +183,7 @@ def see_picture(law: SightLaw, sight: Sight, memory: Array, number: int) -> None
     if number == sight.number:
         return
     sight.number = number
-    size = 3 + 3 * law.rings
+    size = picture_size(law.rings)
     at = law.pictures + size * (number % law.kept)
     for i in range(size):
         memory[law.seen + i] = memory[at + i]
