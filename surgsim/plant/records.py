@@ -32,8 +32,7 @@ def world_of(
     world.trocar = -1 if scene.trocar_site is None else scene.trocar_site
     world.mocap = -1 if scene.port_mocap is None else scene.port_mocap
     world.jaws = scene.parts.find(mujoco.mjtObj.mjOBJ_BODY, "jaws")
-    hinged = [scene.parts.find(mujoco.mjtObj.mjOBJ_BODY, name) for name in ("jaw_left", "jaw_right")]
-    world.hinged = sum(body >= 0 for body in hinged)
+    world.hinged = int(np.count_nonzero(model.body_parentid == world.jaws))
     world.substeps = round(control_period_s / model.opt.timestep)
     world.disturbed, world.touched, world.walled = disturbed, touched, scene.wall is not None
     world.dt_s, world.timestep_s = control_period_s, model.opt.timestep

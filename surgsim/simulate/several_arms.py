@@ -99,10 +99,9 @@ class SeveralArms:
         """How the run ended, with the arm by which it did."""
         told, t_s = self._record, self.arms[0].time_s
         if told.reason == DONE:
-            late = [(name, arm) for name, arm in self._by_name.items() if arm.out_of_time]
-            for name, arm in late:
-                ending = arm.done_at(t_s)
-                return replace(ending, detail=f"arm {name}: {ending.detail}")
+            for name, arm in self._by_name.items():
+                if arm.out_of_time:
+                    return _by(name, arm.done_at(t_s))
             return Ending(outcome=Outcome.COMPLETED, t_s=t_s)
         if told.reason == ARMS_TOUCH:
             found = self._watch.look()
@@ -110,7 +109,7 @@ class SeveralArms:
             return Ending(outcome=Outcome.ARM_COLLISION, t_s=t_s, detail=found)
         name, arm = list(self._by_name.items())[int(told.who)]
         ending = arm.ending(int(told.reason), int(told.status))
-        return replace(ending, detail=f"arm {name}: {ending.detail}" if ending.detail else f"arm {name}")
+        return _by(name, ending)
 
     def hold(self, ticks: int) -> tuple[int, bool]:
         """Up to `ticks` ticks of the stop: how many, and whether it goes on."""
@@ -177,3 +176,8 @@ def _entry(arm: ArmRun) -> list[int]:
     entry = [kernel, *(place_of(record) for record in (run, c, world, guard, stop, watch, hooks))]
     assert len(entry) == ENTRY
     return entry
+
+
+def _by(name: str, ending: Ending) -> Ending:
+    """How a run ended, with the arm by which it did."""
+    return replace(ending, detail=f"arm {name}: {ending.detail}" if ending.detail else f"arm {name}")
