@@ -5,7 +5,6 @@ a stamp of what it was made from, and `tests/test_made.py` compares that with wh
 the gallery are run and drawn only where picture or result is out of date.
 """
 
-import hashlib
 import json
 import subprocess
 import sys
@@ -17,7 +16,7 @@ import gallery
 import numpy as np
 import tables
 from PIL import Image
-from stamps import digest, mark, save
+from stamps import assets, digest, mark, save, save_again
 
 from surgsim.errors import SurgsimError
 from surgsim.models.arm import ArmModel
@@ -54,9 +53,7 @@ def scene_stamp(name: str, camera: str) -> str:
     each, starts = each_arm(load_experiment(name)), starts_of(name)
     scenes = [one.scene.model_dump_json() for one in each]
     told = [*scenes, camera, *map(_rounded, starts)]
-    every = sorted(path for path in (tables.ROOT / "assets").rglob("*") if path.is_file())
-    assets = [path.read_bytes() for path in every if path.parent.name != "props"]
-    return digest([*told, *(hashlib.sha256(content).hexdigest() for content in assets)])
+    return digest([*told, *(sha for folder, sha in assets() if folder[0] != "props")])
 
 
 def starts_of(name: str) -> list[np.ndarray]:
@@ -163,9 +160,7 @@ def draw_errors() -> None:
         ax.set_yticks(range(len(rows)), [row[0] for row in reversed(rows)])
         ax.set(xscale="log", xlabel="RMS over the run [mm]", ylim=(-0.5, len(rows) - 0.5))
         legend_below(axes, len(colors))
-    with Image.open(path) as image:
-        image.load()
-        save(image, path, errors_stamp())
+    save_again(path, errors_stamp())
 
 
 def draw_peg_and_ring() -> None:
@@ -192,9 +187,7 @@ def draw_peg_and_ring() -> None:
             ax.set(ylabel=label)
         for ax in axes.flat:
             ax.set(xlabel="delay, one way [ms]", xticks=delays)
-    with Image.open(path) as image:
-        image.load()
-        save(image, path, peg_and_ring_stamp())
+    save_again(path, peg_and_ring_stamp())
 
 
 def peg_and_ring_stamp() -> str:
@@ -217,9 +210,7 @@ def draw_paths() -> None:
             ax.set(ylabel="z [mm], from the side" if np.ptp(z) > 1.0 else "y [mm], from above")
         axes[0, 0].set(aspect="equal")
         legend_below(axes, len(ARMS))
-    with Image.open(path) as image:
-        image.load()
-        save(image, path, paths_stamp())
+    save_again(path, paths_stamp())
 
 
 def main() -> int:

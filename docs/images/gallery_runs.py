@@ -3,7 +3,6 @@
 Only those are run whose picture or result is of another scenario than that of now.
 """
 
-import hashlib
 import json
 import sys
 from collections.abc import Iterator, Sequence
@@ -13,7 +12,7 @@ from typing import Any
 
 import numpy as np
 from PIL import Image
-from stamps import digest, mark, stamped
+from stamps import assets, digest, mark, stamped
 
 import surgsim
 from surgsim.api.available import available
@@ -24,6 +23,7 @@ from surgsim.export.video import picture_times, row_at, side_by_side
 from surgsim.models.drawing import Picture
 from surgsim.scenario.arms import each_arm
 from surgsim.scenario.load import load_experiment
+from surgsim.scenario.schema import Scenario
 from surgsim.trace.trace import Trace
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -58,25 +58,22 @@ _END_S, _STOP_PICTURES = 1.2, 4
 def stamp(name: str) -> str:
     """What picture and result of a scenario are made from: the scenario, its assets, and the cameras."""
     scenario = load_experiment(name, seed=seed(name))
-    robots = {str(one.robot.name) for one in each_arm(scenario)}
-    assets = [told for folder, told in _assets() if _is_used(folder, robots, name)]
-    return digest([scenario.sha256(), *_cameras(name), *EXTERNALS.get(name, {}).values(), *assets])
+    used = [told for folder, told in _assets() if _is_used(folder, each_arm(scenario))]
+    return digest([scenario.sha256(), *_cameras(name), *EXTERNALS.get(name, {}).values(), *used])
 
 
-def _is_used(folder: tuple[str, ...], robots: set[str], name: str) -> bool:
-    """Whether a scenario is made of the assets of a folder: of its robots', and props' where it has jaws."""
+def _is_used(folder: tuple[str, ...], arms: Sequence[Scenario]) -> bool:
+    """Whether arms are made of the assets of a folder: of their robots', and props' where jaws are hinged."""
     if folder[0] == "robots":
-        return folder[1] in robots
-    return folder[0] != "props" or name.startswith("peg_and_ring_friction_")
+        return folder[1] in {one.robot.name for one in arms}
+    hinged = any(getattr(prop, "hold", "") == "friction" for one in arms for prop in one.props)
+    return folder[0] != "props" or hinged
 
 
 @lru_cache(maxsize=1)
 def _assets() -> list[tuple[tuple[str, ...], str]]:
     """Folders below `assets` and hash of every file that a shipped scenario can be made of."""
-    top = ROOT / "assets"
-    files = sorted(path for path in top.rglob("*") if path.is_file())
-    every = [(path.relative_to(top).parts, hashlib.sha256(path.read_bytes()).hexdigest()) for path in files]
-    return [(parts, told) for parts, told in every if parts[0] != "test_arms"]
+    return [(folder, told) for folder, told in assets() if folder[0] != "test_arms"]
 
 
 def _cameras(name: str) -> tuple[str, str]:

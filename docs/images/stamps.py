@@ -8,6 +8,7 @@ from PIL import Image
 from PIL.PngImagePlugin import PngInfo
 
 _NAME = "surgsim"
+_ASSETS = Path(__file__).resolve().parents[2] / "assets"
 _LONG = hashlib.sha256().digest_size * 2
 _REMARK = b"\x21\xfe" + bytes([_LONG])
 """How a remark of that many letters begins in a GIF; a zero ends it, and a semicolon the file."""
@@ -16,6 +17,14 @@ _REMARK = b"\x21\xfe" + bytes([_LONG])
 def digest(parts: Iterable[str]) -> str:
     """A stamp of some texts."""
     return hashlib.sha256("\n".join(parts).encode()).hexdigest()
+
+
+def assets() -> list[tuple[tuple[str, ...], str]]:
+    """Every file below `assets`: its folders and name, and a hash of it."""
+    files = sorted(path for path in _ASSETS.rglob("*") if path.is_file())
+    return [
+        (path.relative_to(_ASSETS).parts, hashlib.sha256(path.read_bytes()).hexdigest()) for path in files
+    ]
 
 
 def stamped(path: Path) -> str:
@@ -33,6 +42,13 @@ def save(image: Image.Image, path: Path, stamp: str) -> None:
     about.add_text(_NAME, stamp)
     image.save(path, optimize=True, pnginfo=about)
     print(path)
+
+
+def save_again(path: Path, stamp: str) -> None:
+    """Put a stamp into a PNG picture that has none."""
+    with Image.open(path) as image:
+        image.load()
+        save(image, path, stamp)
 
 
 def mark(path: Path, stamp: str) -> None:
