@@ -14,18 +14,26 @@ from surgsim.studies.bilateral_schemes import STUDY
 from surgsim.studies.bilateral_schemes.cases import (
     DELAYS_MS,
     GRIPS,
-    LOSSES,
     MADE_PASSIVE,
+    NETWORKS,
     SCHEMES,
     SEEDS,
+    SURROUNDINGS,
     Push,
     pushes,
 )
-from surgsim.studies.bilateral_schemes.measures import interval, map_table, winners_table
+from surgsim.studies.bilateral_schemes.measures import (
+    best_table,
+    interval,
+    map_table,
+    schemes_table,
+    winners_table,
+)
 
 
 def row(scheme, mismatch, seed=0, **changes):
-    found = {"scheme": scheme, "grip": "normal", "loss": 0.0, "delay_ms": 100, "seed": seed}
+    found = {"scheme": scheme, "surroundings": "wall", "grip": "normal", "loss": 0.0, "jitter_ms": 0}
+    found |= {"delay_ms": 100, "seed": seed}
     found |= {"passive": 1.0, "rests": 1.0, "excess_j": -0.1, "contact_force_n": 3.0, "drift_mm": 1.0}
     return found | {"mismatch": mismatch} | changes
 
@@ -60,6 +68,32 @@ def test_the_best_is_the_most_transparent_of_those_that_are_passive_and_rest_wit
     assert (none["best"], none["qualified"], none["mismatch"]) == ("none", 0, None)
 
 
+def test_a_scheme_is_counted_where_it_is_good_and_where_nobody_is_told_from_it():
+    rows = [
+        *seeds("P+d", 0.10, 0.11, 0.12),
+        *seeds("waves", 0.112, 0.12, 0.13),
+        *seeds("waves", 0.2, 0.2, 0.2, delay_ms=300),
+        *seeds("P+d", 0.1, 0.1, 0.1, delay_ms=300, rests=0.0, excess_j=0.02, passive=0.0),
+        *seeds("P+d", 0.1, 0.1, None, delay_ms=300, jitter_ms=20),
+    ]
+    table = map_table(rows)
+    held, waves = schemes_table(table)
+    assert held == {
+        "scheme": "P+d",
+        "places": 3,
+        "passive": 2,
+        "rests": 2,
+        "qualified": 1,
+        "best": 1,
+        "best_or_not_told_apart": 1,
+        "excess_max_mj": pytest.approx(20.0),
+    }
+    assert (waves["places"], waves["best"], waves["best_or_not_told_apart"]) == (2, 1, 2)
+    clean, jitter = best_table(winners_table(table))
+    assert (clean["100 ms"], clean["300 ms"]) == ("P+d +1", "waves")
+    assert (jitter["jitter_ms"], jitter["300 ms"]) == (20, "none")
+
+
 def tables(**excess):
     rows = [line for name in SCHEMES for line in seeds(name, 0.1, 0.1, 0.1)]
     for line in rows:
@@ -85,14 +119,18 @@ def test_claims_turn_with_what_was_measured():
 def test_the_map_has_every_place_once():
     cells = pushes()
     assert len(set(cells)) == len(cells)
-    assert len(cells) == len(SCHEMES) * len(GRIPS) * len(DELAYS_MS) * len(LOSSES) * len(SEEDS)
+    places = len(SURROUNDINGS) * len(GRIPS) * len(DELAYS_MS) * len(NETWORKS)
+    assert len(cells) == len(SCHEMES) * places * len(SEEDS)
 
 
 @pytest.mark.parametrize("scheme", SCHEMES)
 def test_every_scheme_is_one_that_a_scenario_can_name(scheme):
-    task = Push(scheme=scheme, grip="light", delay_ms=600, loss=0.2, seed=2).scenario().task
-    assert (task.channel.delay_s, task.channel.loss) == (0.3, 0.2)
-    assert task.bilateral.type in SCHEMES[scheme]
+    push = Push(scheme=scheme, surroundings="tissue", grip="light", delay_ms=600, loss=0.2, jitter_ms=20)
+    scenario = push.scenario()
+    channel = scenario.task.channel
+    assert (channel.delay_s, channel.loss, channel.jitter_s) == (0.3, 0.2, 0.02)
+    assert scenario.task.bilateral.type in SCHEMES[scheme]
+    assert [part.type for part in (*scenario.props, *scenario.disturbances)] == ["tissue"]
 
 
 def test_quick_through_the_command(tmp_path):
@@ -110,11 +148,15 @@ RESULTS = Path(__file__).resolve().parents[2] / "results" / "bilateral_schemes"
 
 
 def test_the_committed_page_is_that_of_the_committed_pushes(read_numbers):
-    committed = {name: read_numbers(RESULTS / f"{name}.csv") for name in ("pushes", "map", "winners")}
+    committed = {
+        name: read_numbers(RESULTS / f"{name}.csv") for name in ("pushes", "map", "winners", "schemes")
+    }
     assert len(committed["pushes"]) == len(pushes())
     page = (RESULTS / "README.md").read_text()
     for claim in STUDY.judge({**committed, "map": map_table(committed["pushes"])}):
         assert f"| {claim.text} | {claim.source} | **{claim.verdict}** |" in page
     again = winners_table(map_table(committed["pushes"]))
     assert [line["best"] for line in again] == [line["best"] for line in committed["winners"]]
+    counted = schemes_table(map_table(committed["pushes"]))
+    assert [line["qualified"] for line in counted] == [line["qualified"] for line in committed["schemes"]]
     assert sorted(path.name for path in RESULTS.glob("*.png")) == ["stability.png", "transparency.png"]

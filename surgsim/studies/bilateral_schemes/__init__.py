@@ -1,11 +1,20 @@
 """Bilateral schemes compared: which is passive, at rest and transparent at which delay."""
 
+from collections.abc import Sequence
+
 from surgsim.display import count
 from surgsim.studies.bilateral_schemes import page
 from surgsim.studies.bilateral_schemes.cases import DELAYS_MS, MADE_PASSIVE, PAPER, SCHEMES, Push, pushes
-from surgsim.studies.bilateral_schemes.measures import map_table, winners_table, worst_excess
+from surgsim.studies.bilateral_schemes.measures import (
+    best_table,
+    is_good,
+    map_table,
+    schemes_table,
+    winners_table,
+    worst_excess,
+)
 from surgsim.studies.study import Claim, Groups, Judged, Study, holds
-from surgsim.studies.tables import Row, Tables, number, pick
+from surgsim.studies.tables import Row, Tables, groups, pick
 from surgsim.teleop.judgement import PASSIVE_J
 
 _PASSIVE_MJ = 1e3 * PASSIVE_J
@@ -31,13 +40,17 @@ def _ours(tables: Tables) -> Judged:
     found = worst_excess(tables["map"], SCHEME_OURS)
     rows = pick(tables["map"], scheme=SCHEME_OURS)
     moving = [row for row in rows if row["rests"] != row["seeds"]]
-    places = "; ".join(
-        f"{row['grip']} grip, {number(row, 'delay_ms'):g} ms, loss {row['loss']}" for row in moving
-    )
     return holds(found <= _PASSIVE_MJ), (
         f"at most {found:.3g} mJ beyond its stock in {count(len(rows), 'place')}; "
-        f"not at rest in {len(moving)}: {places or 'none'}"
+        f"not at rest in {len(moving)}{_where(moving)}"
     )
+
+
+def _where(rows: Sequence[Row]) -> str:
+    """How rows are spread over what is pushed on, by which hand."""
+    found = groups(rows, "surroundings", "grip")
+    parts = (f"{len(those)} on the {place} in a {grip} grip" for (place, grip), those in found.items())
+    return f" ({', '.join(parts)})" if rows else ""
 
 
 def _others(tables: Tables) -> Judged | None:
@@ -55,7 +68,7 @@ def _without(tables: Tables) -> Judged | None:
     names = [name for name in SCHEMES if name in known and name not in MADE_PASSIVE]
     if not names:
         return None
-    bad = {name: [row for row in pick(tables["map"], scheme=name) if not _good(row)] for name in names}
+    bad = {name: [row for row in pick(tables["map"], scheme=name) if not is_good(row)] for name in names}
     told = "; ".join(f"{name} in {count(len(rows), 'place')}" for name, rows in bad.items())
     every = all(bad.values())
     return "holds" if every else "depends" if any(bad.values()) else "does not hold", (
@@ -63,13 +76,11 @@ def _without(tables: Tables) -> Judged | None:
     )
 
 
-def _good(row: Row) -> bool:
-    return row["passive"] == row["rests"] == row["seeds"]
-
-
 def _everywhere(tables: Tables) -> Judged:
     names = {str(row["scheme"]) for row in tables["map"]}
-    whole = [name for name in SCHEMES if name in names and all(map(_good, pick(tables["map"], scheme=name)))]
+    whole = [
+        name for name in SCHEMES if name in names and all(map(is_good, pick(tables["map"], scheme=name)))
+    ]
     return (
         "holds" if whole else "does not hold",
         f"passive and at rest at every place: {', '.join(whole) or 'none'}",
@@ -79,7 +90,7 @@ def _everywhere(tables: Tables) -> Judged:
 SCHEME_OURS = "passive convex, tank"
 STUDY = Study(
     name="bilateral_schemes",
-    heading="Bilateral schemes over delay and loss",
+    heading="Bilateral schemes over delay, loss and jitter",
     introduction=page.INTRODUCTION,
     quick_note="three schemes, short pushes through 100 ms, without figures",
     paper=PAPER,
@@ -88,12 +99,18 @@ STUDY = Study(
         "pushes": lambda results: results.rows("pushes"),
         "map": lambda results: map_table(results.rows("pushes")),
         "winners": lambda results: winners_table(map_table(results.rows("pushes"))),
+        "schemes": lambda results: schemes_table(map_table(results.rows("pushes"))),
+        "best": lambda results: best_table(winners_table(map_table(results.rows("pushes")))),
     },
     claims=[
         Claim("surgsim", "ours, with tanks and valve, gives no energy beyond its stock anywhere", _ours),
         Claim("surgsim", "the other schemes that are to be passive are", _others),
         Claim("surgsim", "a scheme with nothing to keep it passive fails somewhere", _without),
-        Claim("surgsim", f"some scheme is passive and rests from 0 to {DELAYS_MS[-1]} ms", _everywhere),
+        Claim(
+            "surgsim",
+            f"some scheme is passive and rests everywhere, from 0 to {DELAYS_MS[-1]} ms",
+            _everywhere,
+        ),
     ],
     sections=page.SECTIONS,
     figures=page.FIGURES,

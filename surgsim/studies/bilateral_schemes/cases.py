@@ -1,4 +1,4 @@
-"""One push on the wall by every bilateral scheme, over delay, loss and grip."""
+"""One push by every bilateral scheme, over delay, loss, jitter, grip and what is pushed on."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -51,8 +51,18 @@ MADE_PASSIVE = (
 )
 """Schemes with something that is to keep them passive."""
 DELAYS_MS = (0, 100, 300, 600, 1000)
-LOSSES = (0.0, 0.2)
+NETWORKS = ((0.0, 0), (0.2, 0), (0.5, 0), (0.0, 20), (0.5, 20))
+"""Share of packets that are lost, and standard deviation of the delay [ms], each way."""
 GRIPS: tuple[Grip, ...] = ("normal", "light")
+_SURFACE = "point_m: [0.0, 0.65, -0.06]"
+SURROUNDINGS: dict[str, tuple[str, str]] = {
+    "wall": (
+        f"[{{type: contact_wall, {_SURFACE}, stiffness_n_per_m: 20000.0, damping_n_s_per_m: 100.0}}]",
+        "[]",
+    ),
+    "tissue": ("[]", f"[{{type: tissue, {_SURFACE}, stiffness_n_per_m: 200.0}}]"),
+}
+"""What is pushed on: `props` and `disturbances`."""
 SEEDS = (0, 1, 2)
 
 PUSH_S, ROUND_TRIPS, WINDOW_S = 6.0, 4.0, 2.0
@@ -66,28 +76,33 @@ _LEAST_N = 0.1
 
 @dataclass(frozen=True, kw_only=True)
 class Push(SimulatedCase):
-    """The hand moves aside, then to 15 mm below the wall, and stays: once, without looking.
+    """The hand moves aside, then to 15 mm below the surface, and stays: once, without looking.
 
     Attributes:
         scheme: One of `SCHEMES`.
+        surroundings: What is pushed on, one of `SURROUNDINGS`.
         grip: How firmly the hand holds the handle.
         delay_ms: Round trip; the operator expects it [ms].
         loss: Share of packets lost, each way.
+        jitter_ms: Standard deviation of the delay each way, beyond `delay_ms` [ms].
         seed: Of operator and channels.
         cut_s: Length of the run if not the whole push [s].
     """
 
     scheme: str
+    surroundings: str = "wall"
     grip: Grip
     delay_ms: int
     loss: float
+    jitter_ms: int = 0
     seed: int = 0
     cut_s: float | None = None
 
     @property
     def label(self) -> str:
         """In words."""
-        return f"{self.scheme}, {self.grip} grip, {self.delay_ms} ms, loss {self.loss:g}, seed {self.seed}"
+        line = f"{self.delay_ms} ms, loss {self.loss:g}, jitter {self.jitter_ms} ms"
+        return f"{self.scheme}, {self.surroundings}, {self.grip} grip, {line}, seed {self.seed}"
 
     @property
     def duration_s(self) -> float:
@@ -95,14 +110,18 @@ class Push(SimulatedCase):
         return self.cut_s or round(PUSH_S + ROUND_TRIPS * self.delay_ms / 1000.0, 3)
 
     def scenario(self) -> Scenario:
-        """The shipped wall with this push and this scheme."""
-        line = f"{{delay_s: {self.delay_ms / 2000.0}, jitter_s: 0.0, loss: {self.loss}}}"
+        """The shipped push with this scheme, these surroundings and this channel."""
+        props, disturbances = SURROUNDINGS[self.surroundings]
+        delay_s, jitter_s = self.delay_ms / 2000.0, self.jitter_ms / 1000.0
+        line = f"{{delay_s: {delay_s}, jitter_s: {jitter_s}, loss: {self.loss}}}"
         return load_scenario(
             "teleop_wall_panda",
             seed=self.seed,
             assignments=[
                 "theatre=false",
                 "plant.energy_ledger=false",
+                f"props={props}",
+                f"disturbances={disturbances}",
                 f"task.goals=[{_ASIDE}, {_DOWN}]",
                 f"task.bilateral={SCHEMES[self.scheme]}",
                 f"task.duration_s={self.duration_s}",
@@ -113,7 +132,7 @@ class Push(SimulatedCase):
 
     def measures(self, trace: Trace) -> Row:
         """What it is, energy, whether it rests, and what the hand feels of the contact."""
-        names = ("scheme", "grip", "delay_ms", "loss", "seed")
+        names = ("scheme", "surroundings", "grip", "loss", "jitter_ms", "delay_ms", "seed")
         return {**{name: getattr(self, name) for name in names}, **push_measures(trace.active())}
 
 
@@ -154,6 +173,16 @@ def _size(trace: Trace, block: str) -> Array:
 def pushes() -> Sequence[Push]:
     """Every cell of the map, with every seed."""
     return [
-        Push(scheme=scheme, grip=grip, delay_ms=delay, loss=loss, seed=seed)
-        for scheme, grip, delay, loss, seed in product(SCHEMES, GRIPS, DELAYS_MS, LOSSES, SEEDS)
+        Push(
+            scheme=scheme,
+            surroundings=surroundings,
+            grip=grip,
+            delay_ms=delay,
+            loss=loss,
+            jitter_ms=jitter,
+            seed=seed,
+        )
+        for scheme, surroundings, grip, (loss, jitter), delay, seed in product(
+            SCHEMES, SURROUNDINGS, GRIPS, NETWORKS, DELAYS_MS, SEEDS
+        )
     ]

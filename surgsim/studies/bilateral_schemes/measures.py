@@ -1,4 +1,4 @@
-"""The map: a row for each scheme and place, with its interval; and who is best where."""
+"""The map: a row for each scheme and place, with its interval; who is best where; how often each is good."""
 
 import math
 from collections.abc import Sequence
@@ -9,6 +9,9 @@ from scipy.stats import t as student
 from surgsim.studies.tables import Cell, Row, groups, number, numbers, pick
 
 CONFIDENCE = 0.95
+NETWORK = ("surroundings", "grip", "loss", "jitter_ms")
+PLACE = (*NETWORK, "delay_ms")
+"""Columns that say what is pushed on, by which hand, through what."""
 
 
 def interval(values: Sequence[float]) -> tuple[float, float, float]:
@@ -23,7 +26,7 @@ def interval(values: Sequence[float]) -> tuple[float, float, float]:
 
 def map_table(pushes: Sequence[Row]) -> list[Row]:
     """A row for each place and scheme: in how many seeds it is passive and rests, and its mismatch."""
-    keys = ("grip", "loss", "delay_ms", "scheme")
+    keys = (*PLACE, "scheme")
     table: list[Row] = []
     for key, rows in groups(pushes, *keys).items():
         felt = [number(row, "mismatch") for row in rows if row["mismatch"] is not None]
@@ -45,23 +48,24 @@ def map_table(pushes: Sequence[Row]) -> list[Row]:
     return table
 
 
+def is_good(row: Row) -> bool:
+    """Whether a scheme is passive and rests at a place, with every seed."""
+    return row["passive"] == row["rests"] == row["seeds"]
+
+
 def qualified(rows: Sequence[Row]) -> list[Row]:
     """Schemes that are passive and rest with every seed, and press; most transparent first."""
-    good = [
-        row for row in rows if row["passive"] == row["rests"] == row["seeds"] and row["mismatch"] is not None
-    ]
+    good = [row for row in rows if is_good(row) and row["mismatch"] is not None]
     return sorted(good, key=lambda row: number(row, "mismatch"))
 
 
 def winners_table(table: Sequence[Row]) -> list[Row]:
     """Who is best at each place: the smallest mismatch of those that qualify, and who is not told from it."""
     found: list[Row] = []
-    for (grip, loss, delay), rows in groups(table, "grip", "loss", "delay_ms").items():
+    for place, rows in groups(table, *PLACE).items():
         good = qualified(rows)
         row: dict[str, Cell] = {
-            "grip": grip,
-            "loss": loss,
-            "delay_ms": delay,
+            **dict(zip(PLACE, place, strict=True)),
             "qualified": len(good),
             "best": "none",
         }
@@ -75,6 +79,41 @@ def winners_table(table: Sequence[Row]) -> list[Row]:
             row |= {key: best[key] for key in ("mismatch", "mismatch_low", "mismatch_high")}
             row["not_told_apart"] = ", ".join(str(other["scheme"]) for other in near)
         found.append(row)
+    return found
+
+
+def best_table(winners: Sequence[Row]) -> list[Row]:
+    """The winners with the delays side by side: the best, and how many are not told from it."""
+    found: list[Row] = []
+    for place, rows in groups(winners, *NETWORK).items():
+        row: dict[str, Cell] = dict(zip(NETWORK, place, strict=True))
+        for winner in rows:
+            near = str(winner["not_told_apart"])
+            others = f" +{near.count(',') + 1}" if near else ""
+            row[f"{number(winner, 'delay_ms'):g} ms"] = f"{winner['best']}{others}"
+        found.append(row)
+    return found
+
+
+def schemes_table(table: Sequence[Row]) -> list[Row]:
+    """In how many places each scheme is passive, rests, qualifies and is best, and its worst excess."""
+    winners = winners_table(table)
+    found: list[Row] = []
+    for (scheme,), rows in groups(table, "scheme").items():
+        first = pick(winners, best=scheme)
+        near = [row for row in winners if str(scheme) in str(row["not_told_apart"]).split(", ")]
+        found.append(
+            {
+                "scheme": scheme,
+                "places": len(rows),
+                "passive": sum(row["passive"] == row["seeds"] for row in rows),
+                "rests": sum(row["rests"] == row["seeds"] for row in rows),
+                "qualified": len(qualified(rows)),
+                "best": len(first),
+                "best_or_not_told_apart": len(first) + len(near),
+                "excess_max_mj": max(numbers(rows, "excess_max_mj")),
+            }
+        )
     return found
 
 
