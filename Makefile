@@ -18,6 +18,12 @@ INSTALLED_DOCS := $(VENV)/.surgsim-docs-$(STATE)
 INSTALLED_ALL := $(VENV)/.surgsim-all-$(STATE)
 # Python compiles a module when it is first imported; pip would compile all of them, which takes as long as the rest.
 PIP_INSTALL := "$(PY)" -m pip install --disable-pip-version-check --no-compile -c "$(ROOT)/constraints.txt"
+# uv installs in seconds what takes pip most of a minute. It is put beside the environment for as long as it is needed, and
+# asks the index that pip is configured for; where it cannot be had, or does not get through, pip does it all.
+UV := $(VENV)/.uv
+GET_UV := $(PIP_INSTALL) --quiet --upgrade --target '$(UV)' uv
+UV_INDEX := "$(PY)" -m pip config list 2> /dev/null | sed -nE "s/^(global|install|:env:)\.index-url='(.*)'$$/\2/p" | head -n 1
+UV_INSTALL := UV_SYSTEM_CERTS=1 "$(UV)/bin/uv" pip install --no-config --python "$(PY)" $${INDEX:+--default-index "$$INDEX"} -c "$(ROOT)/constraints.txt"
 # pip says nothing while it unpacks: every ten seconds a line tells how much is there.
 ALIVE := began=$$(date +%s); { while sleep 10 > /dev/null 2>&1; do printf '  installing for %s s, %s MB so far\n' "$$(($$(date +%s) - began))" "$$(du -sm '$(VENV)' | cut -f1)" >&2; done; } & trap "kill $$! 2> /dev/null" EXIT;
 OLD_ENOUGH := import sys; v = sys.version_info; sys.exit(0 if v >= (3, 11) else "surgsim needs Python 3.11 or newer; %s is %d.%d. Set PYTHON=/path/to/python3.11" % (sys.executable, v[0], v[1]))
@@ -72,13 +78,14 @@ clean:  ## remove build products and caches; .venv and runs stay
 	@cd '$(ROOT)' && rm -rf build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis
 	@find '$(ROOT)/surgsim' '$(ROOT)/tests' -name __pycache__ -type d -prune -exec rm -rf {} +
 
-# $(call install,REQUIREMENT): the build tools come first, so that they too follow constraints.txt.
+# $(call install,REQUIREMENT). With pip the build tools come first, so that they too follow constraints.txt.
 define install
 	@"$(PY)" -c '$(OLD_ENOUGH)'
 	@"$(PY)" -m pip --version > /dev/null 2>&1 || "$(PY)" -m ensurepip
 	@echo 'installing surgsim into $(VENV): about 1.5 GB, some minutes' >&2
-	@$(PIP_INSTALL) --quiet hatchling editables
-	@$(ALIVE) $(PIP_INSTALL) --no-build-isolation -e '$(1)' >&2
+	@{ $(GET_UV) && INDEX=$$($(UV_INDEX)) && $(UV_INSTALL) --quiet hatchling editables && $(UV_INSTALL) --no-build-isolation -e '$(1)'; } >&2 \
+	|| { echo 'not by uv: pip installs, which takes longer' >&2; $(ALIVE) { $(PIP_INSTALL) --quiet hatchling editables && $(PIP_INSTALL) --no-build-isolation -e '$(1)'; } >&2; }
+	@rm -rf '$(UV)'
 	@rm -f '$(VENV)'/.surgsim-*
 endef
 

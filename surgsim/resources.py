@@ -18,6 +18,30 @@ def resource_dir(name: str) -> Path:
     return packed if packed.is_dir() else _PACKAGE.parent / name
 
 
+def cores() -> int:
+    """Processors that this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1  # macOS
+
+
+def module_program(
+    name: str, *words: str, environment: Mapping[str, str] | None = None
+) -> tuple[list[str], dict[str, str]]:
+    """Command and environment that run the module `name` as a program of its own.
+
+    It imports from where this process does, and nothing from the working folder because it is that.
+
+    Args:
+        name: The module.
+        words: Its arguments.
+        environment: Its environment variables; None: those of this process.
+    """
+    paths = os.pathsep.join(entry or os.getcwd() for entry in sys.path)
+    given = os.environ if environment is None else environment
+    return [sys.executable, "-P", "-m", name, *words], {**given, "PYTHONPATH": paths}
+
+
 def run_module(
     name: str,
     *words: str,
@@ -27,24 +51,22 @@ def run_module(
 ) -> subprocess.CompletedProcess[bytes]:
     """Run the module `name` as a program of its own, which may crash or hang without harm to this process.
 
-    It imports from where this process does, and nothing from the working folder because it is that.
-
     Args:
         name: The module.
         words: Its arguments.
         timeout_s: After how long it is ended [s].
         given: What it reads on standard input.
-        environment: Its environment variables; None: those of this process.
+        environment: As for `module_program`.
 
     Raises:
         OSError: If it cannot be started.
         subprocess.TimeoutExpired: If it takes too long.
     """
-    paths = os.pathsep.join(entry or os.getcwd() for entry in sys.path)
+    command, variables = module_program(name, *words, environment=environment)
     return subprocess.run(
-        [sys.executable, "-P", "-m", name, *words],
+        command,
         input=given,
-        env={**(os.environ if environment is None else environment), "PYTHONPATH": paths},
+        env=variables,
         capture_output=True,
         timeout=timeout_s,
         check=False,

@@ -4,16 +4,21 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from surgsim.compiling import Compiling, listening
 from surgsim.display import count
+
+if TYPE_CHECKING:
+    from surgsim.scenario.arms import Experiment
 
 _PATIENCE_S = 3.0
 _EVERY_S = 180.0
 _MANY = 100
 _screens: list[Callable[[str], None]] = []
+_helpers: list[Callable[[], None]] = []
 
 
 @contextmanager
@@ -37,6 +42,28 @@ def on_screen(show: Callable[[str], None]) -> Iterator[None]:
         _screens.remove(show)
 
 
+@contextmanager
+def compiled_by_two(scenario: "Experiment") -> Iterator[None]:
+    """If kernels have to be compiled meanwhile, have a second process compile those that every run needs."""
+    from surgsim.scenario.schema import Scenario
+
+    with ExitStack() as stack:
+
+        def start() -> None:
+            from surgsim.models.arm import ArmModel
+            from surgsim.simulate.ahead import compiling_ahead
+
+            if isinstance(scenario, Scenario):
+                joints = ArmModel(scenario.scene).limits.q_min.size
+                stack.enter_context(compiling_ahead(joints))
+
+        _helpers.append(start)
+        try:
+            yield
+        finally:
+            _helpers.remove(start)
+
+
 class _Shown:
     """Counts kernels: a line that is written over on a terminal, else one, and more only if it takes long.
 
@@ -57,6 +84,8 @@ class _Shown:
         if self._next_s is None:
             self._next_s = now + _PATIENCE_S
             self._kept = _is_kept()
+            if self._kept and _helpers:
+                _helpers[-1]()
         if not told.awaited:
             self._count(told, now)
         elif self._under_way:  # of a worker that another one keeps waiting

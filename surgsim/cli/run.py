@@ -57,6 +57,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def execute(options: argparse.Namespace) -> int:
     """Run the scenario; 0 when it completed."""
+    from surgsim.cli.kernels import compiled_by_two
     from surgsim.cli.output import print_run, show_progress
     from surgsim.cli.table import print_prose
     from surgsim.errors import Outcome, SurgsimError, UnreachableError
@@ -79,7 +80,8 @@ def execute(options: argparse.Namespace) -> int:
         require("--live needs", *RECORDING)
     name = f"{scenario.controller_name}-seed{scenario.seed}"
     folder = options.out or _default_folder(Path("runs") / scenario.name, name, operator)
-    with show_progress(f"{scenario.name} {scenario.controller_name}", operator in _LIVE) as progress:
+    shown = show_progress(f"{scenario.name} {scenario.controller_name}", operator in _LIVE)
+    with compiled_by_two(scenario), shown as progress:
         try:
             if options.live is not None:
                 from surgsim.live.showing import run_shown

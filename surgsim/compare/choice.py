@@ -1,6 +1,5 @@
 """What a command or a call means: which suite, how many workers, what does the runs, and which of them."""
 
-import os
 import re
 from collections.abc import Container, Sequence
 from pathlib import Path
@@ -9,6 +8,7 @@ from surgsim.compare.engine import Runner
 from surgsim.compare.suite import SuiteConfig, ad_hoc_suite, is_suite, load_suite
 from surgsim.compare.workers import run_jobs
 from surgsim.errors import ScenarioError, SurgsimError, unknown_name
+from surgsim.resources import cores
 from surgsim.scenario.drawn import drawn_names
 from surgsim.scenario.load import shipped
 
@@ -56,7 +56,7 @@ def workers_for(jobs: int | None) -> int:
         SurgsimError: If there would be none.
     """
     if jobs is None:
-        return len(os.sched_getaffinity(0))
+        return cores()
     if jobs < 1:
         raise SurgsimError(f"--jobs: {jobs} is not allowed: must be 1 or more")
     return jobs

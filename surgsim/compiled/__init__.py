@@ -6,6 +6,6 @@ is kept, `identity` the key of an entry, `places` the folder, `lock` how process
 `watch` what a person is told and how long it took.
 """
 
-from surgsim.compiled.kernel import address_of, as_parameter, call_at, compiled
+from surgsim.compiled.kernel import address_of, as_parameter, call_at, compile_for, compiled
 
-__all__ = ["address_of", "as_parameter", "call_at", "compiled"]
+__all__ = ["address_of", "as_parameter", "call_at", "compile_for", "compiled"]

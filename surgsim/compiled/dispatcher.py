@@ -1,7 +1,9 @@
 """A kernel in its two forms: as Python calls it, and as other kernels do."""
 
+import gc
 import inspect
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from functools import cached_property, update_wrapper
 from typing import Any
 
@@ -17,6 +19,18 @@ from surgsim.compiled.refusals import short_refusals
 _OPTIONS = {"nopython": True, "nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
 
 
+@contextmanager
+def _without_collecting() -> Iterator[None]:
+    """Collect no garbage meanwhile: numba makes millions of objects that live, and looking costs a tenth."""
+    collects = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if collects:
+            gc.enable()
+
+
 class _Form(CPUDispatcher):
     """What both forms are: kept on disk, and to be had for one signature alone."""
 
@@ -28,7 +42,7 @@ class _Form(CPUDispatcher):
 
     def compile(self, sig: Any) -> Any:
         """The function compiled for the types of `sig`."""
-        with short_refusals():
+        with short_refusals(), _without_collecting():
             return super().compile(sig)
 
     def for_signature(self, signature: Any) -> "_Form":

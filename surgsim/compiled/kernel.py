@@ -85,6 +85,13 @@ def as_parameter(kernel: Any, signature: Any) -> Any:
     return kernel if ours is None else ours.for_signature(signature)
 
 
+def compile_for(kernel: Any, *arguments: Any) -> None:
+    """Have the `@compiled` function ready for a call from Python with arguments of these types."""
+    ours = _ours(kernel)
+    if ours is not None:
+        ours.compile(arguments)
+
+
 def _ours(kernel: Any) -> Kernel | None:
     """The kernel, also of a function that numba itself was told to compile; None of a Python function."""
     if isinstance(kernel, Kernel) or not is_jitted(kernel):

@@ -1,6 +1,5 @@
 """Errors over time, read from the recordings of a batch: a few runs each, thinned."""
 
-import os
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -13,6 +12,7 @@ from surgsim.array import Array
 from surgsim.compare.observations import COMPLETED
 from surgsim.errors import SurgsimError
 from surgsim.recording.read import read_recording
+from surgsim.resources import cores
 from surgsim.trace.trace import Trace
 
 SLICES = 160
@@ -92,7 +92,7 @@ def _first_of_each(rows: Sequence[Mapping[str, Any]], most: int) -> list[Mapping
 
 
 def _series(root: Path, rows: Sequence[Mapping[str, Any]]) -> Series:
-    with ThreadPoolExecutor(max_workers=min(4, os.cpu_count() or 1)) as pool:
+    with ThreadPoolExecutor(max_workers=min(4, cores())) as pool:
         traces = list(pool.map(lambda row: _trace(root / row["recording"], row["scenario"]), rows))
     pairs = [(row, trace) for row, trace in zip(rows, traces, strict=True) if trace is not None]
     end = max((float(trace["t_s"][-1]) for _, trace in pairs), default=1.0)

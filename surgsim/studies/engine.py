@@ -1,6 +1,5 @@
 """Runs a study: cases in several processes, then tables, claims, figures and the page."""
 
-import os
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import partial
@@ -8,6 +7,7 @@ from itertools import chain
 from pathlib import Path
 
 from surgsim.packages import require
+from surgsim.resources import cores
 from surgsim.studies.figure import figure
 from surgsim.studies.kept import read_measured, write_measured
 from surgsim.studies.page import write_page
@@ -100,7 +100,7 @@ def measure_cases(
         progress(f"{len(found)} of {len(wanted)} cases are there from a run that was interrupted")
     missing = [case for case in wanted if case not in found]
     together, alone = ([case for case in missing if case.alone is flag] for flag in (False, True))
-    processes = min(workers or min(os.cpu_count() or 1, WORKERS), len(together))
+    processes = min(workers or min(cores(), WORKERS), len(together))
     measure = partial(_measure, kept)
     for measured in chain(in_processes(measure, together, processes), map(measure, alone)):
         found[measured.case] = measured

@@ -1,0 +1,83 @@
+"""A second process compiles the kernels that every run needs: the right ones, while it is wanted."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from surgsim.compiled.dispatcher import Kernel
+from surgsim.control.decision import decide
+from surgsim.control.manifold import climb, climb_from, is_inside, project
+from surgsim.control.manipulability import manipulability
+from surgsim.metrics.catalog import compute_metrics
+from surgsim.scenario.load import load_scenario
+from surgsim.simulate import ahead
+from surgsim.simulate.derived import derive
+from surgsim.simulate.loop import simulate
+from surgsim.simulate.ticks import ask_task, hold_ticks, run_ticks
+
+KERNELS: tuple[Kernel, ...] = (
+    run_ticks,
+    hold_ticks,
+    ask_task,
+    decide,
+    derive,
+    project,
+    manipulability,
+    climb,
+    is_inside,
+    climb_from,
+)
+
+
+def forms():
+    return {kernel.py_func.__name__: (set(kernel.overloads), set(kernel._of_signature)) for kernel in KERNELS}
+
+
+def test_what_is_compiled_ahead_is_what_a_run_asks_for():
+    compute_metrics(simulate(load_scenario("circle_lwr4plus", assignments=["task.duration_s=3"])))
+    asked = forms()
+    assert all(overloads or signatures for overloads, signatures in asked.values())
+    for compile_kernel in ahead.kernels(7):
+        compile_kernel()
+    assert forms() == asked
+
+
+def children(pid):
+    return [int(word) for word in Path(f"/proc/{pid}/task/{pid}/children").read_text().split()]
+
+
+def test_the_process_ends_with_the_block():
+    before = set(children(os.getpid()))
+    with ahead.compiling_ahead(7):
+        (helper,) = set(children(os.getpid())) - before
+    assert helper not in children(os.getpid())
+
+
+def test_on_one_processor_there_is_none(monkeypatch):
+    monkeypatch.setattr(ahead, "cores", lambda: 1)
+    before = children(os.getpid())
+    with ahead.compiling_ahead(7):
+        assert children(os.getpid()) == before
+
+
+@pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="looks into /proc")
+def test_the_process_ends_when_the_first_is_killed():
+    code = (
+        "import time\nfrom surgsim.simulate.ahead import compiling_ahead\n"
+        "with compiling_ahead(7):\n    print('there', flush=True)\n    time.sleep(60)\n"
+    )
+    first = subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE)
+    assert first.stdout.readline() == b"there\n"
+    (helper,) = children(first.pid)
+    time.sleep(0.5)
+    first.send_signal(signal.SIGKILL)
+    first.communicate()
+    until = time.monotonic() + 30.0
+    while Path(f"/proc/{helper}").exists() and "Z" not in Path(f"/proc/{helper}/stat").read_text().split()[2]:
+        assert time.monotonic() < until, "the process outlives the one that it works for"
+        time.sleep(0.1)
