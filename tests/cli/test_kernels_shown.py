@@ -6,13 +6,16 @@ import re
 import subprocess
 import sys
 import time
+from contextlib import contextmanager
 
 import pytest
 
 from surgsim.cli import kernels
-from surgsim.cli.kernels import compiling_shown, on_screen
+from surgsim.cli.kernels import compiled_by_two, compiling_shown, on_screen
 from surgsim.compiled import places, watch
 from surgsim.compiling import Compiling, tell
+from surgsim.scenario.load import load_scenario
+from surgsim.simulate import ahead
 
 
 def compile_two():
@@ -62,6 +65,26 @@ def test_one_line_in_a_log(capsys, place, clock):
         for _ in range(40):
             compile_two()
     assert capsys.readouterr() == ("", "compiling kernels (once): at most 7, less than a minute\n")
+
+
+def test_a_second_process_is_asked_for_once_and_only_if_something_is_compiled(monkeypatch, place, clock):
+    asked = []
+
+    @contextmanager
+    def ahead_of(joints):
+        asked.append(joints)
+        yield
+        asked.append("ended")
+
+    monkeypatch.setattr(ahead, "compiling_ahead", ahead_of)
+    scenario = load_scenario("circle_lwr4plus")
+    clock(1.0)
+    with compiling_shown(), compiled_by_two(scenario):
+        assert asked == []
+        compile_two()
+        compile_two()
+        assert asked == [7]
+    assert asked == [7, "ended"]
 
 
 def test_how_long_many_take(capsys, place, clock):
