@@ -1,4 +1,4 @@
-"""How the console was operated: the clutch, tremor, and roll. Undefined (NaN) for a trace of another task."""
+"""How the console was operated: clutch, motion scaling, tremor, roll. Undefined (NaN) for another task."""
 
 import math
 
@@ -24,6 +24,19 @@ def clutchings(trace: Trace) -> float:
 def clutch_open_fraction(trace: Trace) -> float:
     """Share of the ticks in which the clutch was not closed."""
     return float(np.mean(trace["clutch_engaged"] < 1.0))
+
+
+def motion_scale(trace: Trace) -> float:
+    """Way of the tip for which the handle stood, over the handle's own while the clutch was closed.
+
+    It is s where the motion scaling is constant, and where it changes its mean over the way; a filter that
+    keeps motion from the tip lowers it. NaN if the handle did not move.
+    """
+    issued, handle = (
+        np.linalg.norm(trace.block(name), axis=1) for name in ("velocity_issued", "handle_velocity")
+    )
+    way = float(np.sum(trace["clutch_engaged"] * handle))
+    return float(np.sum(issued)) / way if way > 0.0 else math.nan
 
 
 def tremor_rms(velocity: Array, period_s: float) -> float:
@@ -84,6 +97,13 @@ METRICS = (
         matters_source=CHOICE,
         meaning="tremor at the tip over that of the motion which the handle stands for",
         compute=with_block("velocity_issued", tremor_transmission, rows=2),
+    ),
+    Metric(
+        name="motion_scale_mean",
+        heading="motion scaling, mean over the way",
+        meaning="way of the tip for which the handle stood, over the handle's with the clutch closed",
+        compute=with_block("velocity_issued", motion_scale),
+        lower_is_better=None,
     ),
     Metric(
         name="clutchings",

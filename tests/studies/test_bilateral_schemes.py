@@ -20,14 +20,18 @@ from surgsim.studies.bilateral_schemes.cases import (
     SEEDS,
     SURROUNDINGS,
     Push,
+    Render,
     pushes,
+    renders,
 )
 from surgsim.studies.bilateral_schemes.measures import (
     best_table,
     interval,
     map_table,
+    rendered_table,
     schemes_table,
     winners_table,
+    z_width_table,
 )
 
 
@@ -144,14 +148,46 @@ def test_quick_through_the_command(tmp_path):
     assert load_study("bilateral_schemes") is STUDY
 
 
+@pytest.mark.parametrize("scheme", ["position-position", "two-layer"])
+def test_the_stiffness_of_a_wall_is_that_of_coupling_and_wall_in_series(scheme):
+    """At the handle it is s^2 times that at the tip; both schemes couple by the same spring."""
+    render = Render(scheme=scheme, wall=True, delay_ms=0)
+    task = render.scenario().task
+    coupling, wall = task.bilateral.stiffness_n_per_m, 20000.0
+    series = task.mapping.scale**2 * coupling * wall / (coupling + wall)
+    assert render.measured().row["stiffness_n_per_m"] == pytest.approx(series, rel=0.01)
+
+
+def test_free_motion_that_is_not_felt_has_no_impedance():
+    """Reflected force of nothing is nothing."""
+    found = Render(scheme="position-force", wall=False, delay_ms=300).measured().row
+    assert abs(found["impedance_ns_per_m"]) < 1e-3
+    assert found["passive"] == 1.0
+
+
+def test_the_z_width_has_both_ends_and_tells_where_it_is_not_passive():
+    def render(wall, stiffness, **changes):
+        row = {"scheme": "P+d", "wall": wall, "delay_ms": 0, "passive": 1.0, "stiffness_n_per_m": stiffness}
+        return row | {"damping_ns_per_m": 6.0, "impedance_ns_per_m": 7.0} | changes
+
+    good = [render(False, 0.0), render(True, 60.0), render(False, 0.0), render(True, 62.0)]
+    (line,) = z_width_table(good)
+    assert (line["free_impedance_ns_per_m"], line["wall_stiffness_n_per_m"]) == (7.0, 61.0)
+    assert rendered_table([line]) == [{"scheme": "P+d", "0 ms": "7, 61"}]
+    (bad,) = rendered_table(z_width_table([*good[:3], render(True, None, passive=0.0)]))
+    assert bad["0 ms"] == "7, - !"
+
+
 RESULTS = Path(__file__).resolve().parents[2] / "results" / "bilateral_schemes"
 
 
 def test_the_committed_page_is_that_of_the_committed_pushes(read_numbers):
     committed = {
-        name: read_numbers(RESULTS / f"{name}.csv") for name in ("pushes", "map", "winners", "schemes")
+        name: read_numbers(RESULTS / f"{name}.csv")
+        for name in ("pushes", "renders", "map", "winners", "schemes")
     }
     assert len(committed["pushes"]) == len(pushes())
+    assert len(committed["renders"]) == len(renders())
     page = (RESULTS / "README.md").read_text()
     for claim in STUDY.judge({**committed, "map": map_table(committed["pushes"])}):
         assert f"| {claim.text} | {claim.source} | **{claim.verdict}** |" in page
@@ -159,4 +195,8 @@ def test_the_committed_page_is_that_of_the_committed_pushes(read_numbers):
     assert [line["best"] for line in again] == [line["best"] for line in committed["winners"]]
     counted = schemes_table(map_table(committed["pushes"]))
     assert [line["qualified"] for line in counted] == [line["qualified"] for line in committed["schemes"]]
-    assert sorted(path.name for path in RESULTS.glob("*.png")) == ["stability.png", "transparency.png"]
+    assert sorted(path.name for path in RESULTS.glob("*.png")) == [
+        "stability.png",
+        "transparency.png",
+        "z_width.png",
+    ]

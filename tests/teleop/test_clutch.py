@@ -141,6 +141,8 @@ def test_the_whole_arm_waits_while_a_hand_in_python_presses_the_pedal():
     assert opened.sum() == pytest.approx(300, abs=2)
     assert np.ptp(run["handle_x_m"][opened]) > 5e-3
     assert METRICS["clutchings"].compute(run) == 1.0
+    scale = run.meta.scenario["task"]["mapping"]["scale"]  # with the clutch half closed too
+    assert METRICS["motion_scale_mean"].compute(run) == pytest.approx(scale, rel=1e-9)
     assert METRICS["clutch_open_fraction"].compute(run) == np.mean(run["clutch_engaged"] < 1.0)
 
 

@@ -42,6 +42,7 @@ def test_the_re_indexed_scenario_uses_clutch_scale_roll_and_filter():
     metrics = compute_metrics(trace)
     assert metrics["clutchings"] >= 1.0
     assert set(trace["motion_scale"][[0, -1]]) == {0.15, 0.3}
+    assert 0.15 < metrics["motion_scale_mean"] < 0.3
     assert trace["roll_rad"].max() > 1.0
     assert trace["roll_rad"].min() < -1.0
     assert metrics["roll_error_rms_deg"] < 1.0

@@ -4,14 +4,24 @@ from collections.abc import Sequence
 
 from surgsim.display import count
 from surgsim.studies.bilateral_schemes import page
-from surgsim.studies.bilateral_schemes.cases import DELAYS_MS, MADE_PASSIVE, PAPER, SCHEMES, Push, pushes
+from surgsim.studies.bilateral_schemes.cases import (
+    DELAYS_MS,
+    MADE_PASSIVE,
+    PAPER,
+    SCHEMES,
+    Push,
+    pushes,
+    renders,
+)
 from surgsim.studies.bilateral_schemes.measures import (
     best_table,
     is_good,
     map_table,
+    rendered_table,
     schemes_table,
     winners_table,
     worst_excess,
+    z_width_table,
 )
 from surgsim.studies.study import Claim, Groups, Judged, Study, holds
 from surgsim.studies.tables import Row, Tables, groups, pick
@@ -23,7 +33,7 @@ _PASSIVE_MJ = 1e3 * PASSIVE_J
 def cases_of(quick: bool) -> Groups:
     """Every push, or a few short ones."""
     if not quick:
-        return {"pushes": pushes()}
+        return {"pushes": pushes(), "renders": renders()}
     return {
         "pushes": [
             Push(scheme=scheme, grip="normal", delay_ms=100, loss=0.0, cut_s=4.0)
@@ -100,6 +110,9 @@ STUDY = Study(
         "map": lambda results: map_table(results.rows("pushes")),
         "winners": lambda results: winners_table(map_table(results.rows("pushes"))),
         "schemes": lambda results: schemes_table(map_table(results.rows("pushes"))),
+        "renders": lambda results: results.rows("renders"),
+        "z_width": lambda results: z_width_table(results.rows("renders")),
+        "rendered": lambda results: rendered_table(z_width_table(results.rows("renders"))),
         "best": lambda results: best_table(winners_table(map_table(results.rows("pushes")))),
     },
     claims=[

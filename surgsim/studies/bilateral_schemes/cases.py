@@ -14,7 +14,7 @@ from surgsim.scenario.load import load_scenario
 from surgsim.scenario.schema import Scenario
 from surgsim.studies.measures import outcome
 from surgsim.studies.study import Paper, SimulatedCase
-from surgsim.studies.tables import Row
+from surgsim.studies.tables import Cell, Row
 from surgsim.teleop.judgement import PASSIVE_J, excess_j
 from surgsim.trace.trace import Trace
 
@@ -68,6 +68,8 @@ SEEDS = (0, 1, 2)
 PUSH_S, ROUND_TRIPS, WINDOW_S = 6.0, 4.0, 2.0
 REST_MM_PER_S, STEADY_N, STEADY_SHARE = 5.0, 0.5, 0.05
 """A push rests: handle slower than this (RMS), and the force's deviation below this or this share of it."""
+DEPTHS_M, HOLD_S, HOLD_ROUND_TRIPS, MOVES_S = (-0.065, -0.08), 2.5, 2.0, 2.0
+"""Where the hand goes to be shown an impedance, how long it holds there, and what the moves take."""
 _LIGHT = ("task.operator.stiffness_n_per_m=20.0", "task.operator.damping_ns_per_m=1.0")
 _ASIDE = "{position_m: [0.02, 0.65, -0.045], push: true, dwell_s: 0.1}"
 _DOWN = "{position_m: [0.0, 0.65, -0.075], push: true, dwell_s: 1000.0}"
@@ -165,6 +167,91 @@ def push_measures(trace: Trace) -> Row:
     }
 
 
+@dataclass(frozen=True, kw_only=True)
+class Render(SimulatedCase):
+    """The hand goes to 5 mm and then to 20 mm below a surface, and holds at both: of a wall, or of nothing.
+
+    What it feels in free motion and on the wall are the ends of the impedances that a scheme renders.
+
+    Attributes:
+        scheme: One of `SCHEMES`.
+        wall: Whether there is one.
+        delay_ms: Round trip; the operator expects it [ms].
+        seed: Of operator and channels.
+    """
+
+    scheme: str
+    wall: bool
+    delay_ms: int
+    seed: int = 0
+
+    @property
+    def label(self) -> str:
+        """In words."""
+        return (
+            f"{self.scheme}, {'wall' if self.wall else 'free motion'}, {self.delay_ms} ms, seed {self.seed}"
+        )
+
+    @property
+    def dwell_s(self) -> float:
+        """How long it holds at either depth [s]."""
+        return round(HOLD_S + HOLD_ROUND_TRIPS * self.delay_ms / 1000.0, 3)
+
+    def scenario(self) -> Scenario:
+        """The shipped push in a normal grip, through a clean line."""
+        goals = [f"{{position_m: [0.0, 0.65, {z}], push: true, dwell_s: {self.dwell_s}}}" for z in DEPTHS_M]
+        props, _ = SURROUNDINGS["wall"]
+        return load_scenario(
+            "teleop_wall_panda",
+            seed=self.seed,
+            assignments=[
+                "theatre=false",
+                "plant.energy_ledger=false",
+                f"props={props if self.wall else '[]'}",
+                f"task.goals=[{', '.join(goals)}]",
+                f"task.bilateral={SCHEMES[self.scheme]}",
+                f"task.duration_s={round(2.0 * self.dwell_s + MOVES_S, 3)}",
+                f"task.channel={{delay_s: {self.delay_ms / 2000.0}, jitter_s: 0.0, loss: 0.0}}",
+            ],
+        )
+
+    def measures(self, trace: Trace) -> Row:
+        """What it is, energy, and the impedance that the hand feels."""
+        names = ("scheme", "wall", "delay_ms", "seed")
+        return {**{name: getattr(self, name) for name in names}, **render_measures(trace.active())}
+
+
+def render_measures(trace: Trace) -> Row:
+    """Energy, rest, and what the motors of the console render.
+
+    `damping_ns_per_m` is the power that they take from the handle over its speed's square, and
+    `impedance_ns_per_m` their force over its speed, both by RMS over the run. `stiffness_n_per_m` is the
+    change of their force over that of the handle's position between the ends of both holds.
+    """
+    force, velocity, handle = (trace.block(name) for name in ("master_force", "handle_velocity", "handle"))
+    goal, t = trace["goal"], trace["t_s"]
+    ends = [
+        (goal == k) & (t >= t[goal == k][-1] - WINDOW_S / 2.0)
+        for k in range(len(DEPTHS_M))
+        if (goal == k).any()
+    ]
+    excess = excess_j(trace)
+    row: dict[str, Cell] = {
+        "outcome": outcome(trace),
+        "passive": float(excess <= PASSIVE_J),
+        "excess_j": excess,
+        "damping_ns_per_m": -float((force * velocity).sum() / (velocity**2).sum()),
+        "impedance_ns_per_m": rms(_size(trace, "master_force")) / rms(_size(trace, "handle_velocity")),
+        "stiffness_n_per_m": None,
+        "handle_speed_mm_per_s": None,
+    }
+    if len(ends) == len(DEPTHS_M):
+        change = [np.linalg.norm(a[ends[1]].mean(axis=0) - a[ends[0]].mean(axis=0)) for a in (force, handle)]
+        row["stiffness_n_per_m"] = float(change[0] / change[1])
+        row["handle_speed_mm_per_s"] = 1e3 * max(rms(_size(trace, "handle_velocity")[end]) for end in ends)
+    return row
+
+
 def _size(trace: Trace, block: str) -> Array:
     """Length of a vector at every tick (rows,)."""
     return np.asarray(np.linalg.norm(trace.block(block), axis=1))
@@ -185,4 +272,12 @@ def pushes() -> Sequence[Push]:
         for scheme, surroundings, grip, (loss, jitter), delay, seed in product(
             SCHEMES, SURROUNDINGS, GRIPS, NETWORKS, DELAYS_MS, SEEDS
         )
+    ]
+
+
+def renders() -> Sequence[Render]:
+    """Free motion and the wall by every scheme, at every delay, with every seed."""
+    return [
+        Render(scheme=scheme, wall=wall, delay_ms=delay, seed=seed)
+        for scheme, wall, delay, seed in product(SCHEMES, (False, True), DELAYS_MS, SEEDS)
     ]

@@ -117,6 +117,44 @@ def schemes_table(table: Sequence[Row]) -> list[Row]:
     return found
 
 
+def z_width_table(renders: Sequence[Row]) -> list[Row]:
+    """A row for each scheme and delay: what is felt of free motion and of the wall, means over the seeds."""
+    found: list[Row] = []
+    for (scheme, delay), rows in groups(renders, "scheme", "delay_ms").items():
+        free, wall = pick(rows, wall=False), pick(rows, wall=True)
+        stiffness = [row["stiffness_n_per_m"] for row in wall]
+        found.append(
+            {
+                "scheme": scheme,
+                "delay_ms": delay,
+                "seeds": len(wall),
+                "passive": min(round(sum(numbers(each, "passive"))) for each in (free, wall)),
+                "free_damping_ns_per_m": float(np.mean(numbers(free, "damping_ns_per_m"))),
+                "free_impedance_ns_per_m": float(np.mean(numbers(free, "impedance_ns_per_m"))),
+                "wall_stiffness_n_per_m": None
+                if None in stiffness
+                else float(np.mean(numbers(wall, "stiffness_n_per_m"))),
+            }
+        )
+    return found
+
+
+def rendered_table(z_widths: Sequence[Row]) -> list[Row]:
+    """The same with the delays side by side: free motion, wall, and `!` where it is not passive."""
+    found: list[Row] = []
+    for (scheme,), rows in groups(z_widths, "scheme").items():
+        row: dict[str, Cell] = {"scheme": scheme}
+        for place in rows:
+            stiffness = place["wall_stiffness_n_per_m"]
+            wall = "-" if stiffness is None else f"{stiffness:.3g}"
+            mark = "" if place["passive"] == place["seeds"] else " !"
+            row[f"{number(place, 'delay_ms'):g} ms"] = (
+                f"{number(place, 'free_impedance_ns_per_m'):.2g}, {wall}{mark}"
+            )
+        found.append(row)
+    return found
+
+
 def worst_excess(table: Sequence[Row], scheme: str) -> float:
     """Largest energy of a scheme beyond its stock, over all places [mJ]."""
     return max(numbers(pick(table, scheme=scheme), "excess_max_mj"))

@@ -78,11 +78,28 @@ def _transparency(axes: Axes, _: Results, tables: Tables) -> None:
     label(axes, ylabels=2 * ["mismatch of the forces"], legend=4)
 
 
+def _z_width(axes: Axes, _: Results, tables: Tables) -> None:
+    """What the hand feels of free motion and of the wall, over the delay, where a scheme is passive."""
+    for n, scheme in enumerate(SCHEMES):
+        rows = [row for row in pick(tables["z_width"], scheme=scheme) if row["passive"] == row["seeds"]]
+        rows = [row for row in rows if row["wall_stiffness_n_per_m"] is not None]
+        style = {"color": _LINES[n % len(_LINES)], "linestyle": "-" if n < len(_LINES) else "--"}
+        x = [number(row, "delay_ms") for row in rows]
+        for ax, column in zip(axes[0], ("free_impedance_ns_per_m", "wall_stiffness_n_per_m"), strict=True):
+            ax.plot(x, [number(row, column) for row in rows], marker="o", label=scheme, **style)
+    axes[0, 0].set_yscale("symlog", linthresh=1.0)
+    axes[0, 0].set(title="free motion", xlabel="round trip (ms)", ylabel="impedance felt (N s/m)")
+    axes[0, 1].set(title="wall of 20 kN/m", xlabel="round trip (ms)", ylabel="stiffness felt (N/m)")
+    label(axes, legend=4)
+
+
 _MAP = "Which scheme is passive and rests, over network and round trip"
 _LINES_TITLE = "Mismatch of the forces at hand and tip, over the round trip, normal grip"
+_Z_TITLE = "What the hand feels of free motion and of a wall, where the scheme is passive in both"
 FIGURES = (
     Figure("stability.png", _MAP, _stability, (2, 2), (17.0, 11.0), (True, True)),
     Figure("transparency.png", _LINES_TITLE, _transparency, (2, 2), (12.0, 9.0), (True, True)),
+    Figure("z_width.png", _Z_TITLE, _z_width, (1, 2), (12.0, 5.5)),
 )
 
 INTRODUCTION = """\
@@ -93,8 +110,9 @@ trocar on a wall of 20 kN/m, or on soft tissue of 200 N/m. The schemes are those
 
     {command}
 
-with {versions}. The CSV files hold every table with nine digits. Three are not shown: `pushes.csv`, one row
-for every push, `map.csv`, one row for every scheme and place, and `winners.csv`, one row for every place."""
+with {versions}. The CSV files hold every table with nine digits. Not shown are `pushes.csv` and
+`renders.csv`, one row for every run, `map.csv`, one for every scheme and place, and `winners.csv`, one for
+every place."""
 _SCHEMES = """## How often each scheme is good
 
 A place is what is pushed on, by which grip, through what round trip, loss and jitter. The hand moves aside,
@@ -120,9 +138,20 @@ _LINES_TEXT = """## Transparency against delay
 
 Where a scheme qualifies, through a clean line and through the worst one."""
 
+_Z_WIDTH = """## Z-width
+
+The range of impedances that a scheme renders passively (Colgate, Brown, IEEE ICRA, 1994): from what the
+hand feels in free motion, which should be nothing, to what it feels of a wall, which should be stiff. The
+hand goes to 5 mm and then to 20 mm below a surface, in a normal grip through a clean line, and holds at both.
+First the impedance in free motion: force of the console's motors over the handle's speed, by RMS, in N s/m.
+Then the stiffness of the wall: the change of that force over the handle's way between both holds, in N/m.
+`!`: not passive with every seed. A stiffness of 60 N/m is that of the coupling, 240 N/m at the tip, in the
+scale of the handle; the wall itself would be 5,000 N/m there. `z_width.csv` has all figures."""
+
 SECTIONS = (
     Section(_SCHEMES, "schemes"),
     Section(_BEST, "best"),
     Section(_MAPS, figures=("stability.png",)),
     Section(_LINES_TEXT, figures=("transparency.png",)),
+    Section(_Z_WIDTH, "rendered", figures=("z_width.png",)),
 )
