@@ -182,7 +182,7 @@ def test_a_table_that_is_too_long_for_a_figure_names_those_that_are_not():
 def test_every_study_of_the_results_has_a_figure(told, tmp_path, request):
     tables = {
         "vprnn": "comparison",
-        "bilateral_schemes": "winners",
+        "bilateral_schemes": "schemes",
         "manipulability_validation": "table_4",
         "passive_teleoperation": "frontier",
     }
