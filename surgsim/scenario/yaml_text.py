@@ -10,7 +10,8 @@ import math
 import re
 import stat
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -48,7 +49,13 @@ def parse_yaml(text: str, source: str) -> YamlDocument:
     Raises:
         ScenarioError: If the text is not that, or uses what is refused here.
     """
-    text = text.removeprefix("\ufeff")
+    found = _parsed(text.removeprefix("\ufeff"), source)
+    return replace(found, tree=copy.deepcopy(found.tree))
+
+
+@lru_cache(maxsize=64)
+def _parsed(text: str, source: str) -> YamlDocument:
+    """The document: a batch reads the same files for every run."""
     builder = TreeBuilder(text, source)
     tree = builder.document()
     if not isinstance(tree, dict):
@@ -105,11 +112,18 @@ def set_value(document: YamlDocument, assignment: str) -> YamlDocument:
             if isinstance(node, dict) and node.get(key) is None:
                 node[key] = {}
             node = node[key]
-    builder = TreeBuilder(text, document.source, label)
-    node[path[-1]] = builder.value(path)
+    value, lines = _value(text, document.source, label, path)
+    node[path[-1]] = copy.deepcopy(value)
     kept = {old: line for old, line in document.lines.items() if old[: len(path)] != path}
     made = {path[:n]: label for n in range(1, len(path)) if path[:n] not in kept}
-    return YamlDocument(tree=tree, lines={**kept, **made, **builder.lines}, source=document.source)
+    return YamlDocument(tree=tree, lines={**kept, **made, **lines}, source=document.source)
+
+
+@lru_cache(maxsize=256)
+def _value(text: str, source: str, label: str, path: KeyPath) -> tuple[Any, Mapping[KeyPath, int | str]]:
+    """The value that an assignment gives to the key at `path`, and its lines."""
+    builder = TreeBuilder(text, source, label)
+    return builder.value(path), builder.lines
 
 
 def _slot(node: Any, path: KeyPath, part: str, label: str) -> str | int:

@@ -287,3 +287,19 @@ TREES = st.recursive(SCALARS, lambda inner: st.lists(inner) | st.dictionaries(KE
 @given(st.dictionaries(KEYS, TREES, max_size=5))
 def test_dump_round_trips(tree):
     assert repr(parse_yaml(dump_yaml(tree), "s.yaml").tree) == repr(tree)
+
+
+def test_a_text_that_was_parsed_before_gives_a_tree_of_its_own():
+    text = "a: {b: [1, 2]}\n"
+    first = parse_yaml(text, "s.yaml")
+    first.tree["a"]["b"].append(3)
+    again = parse_yaml(text, "s.yaml")
+    assert again.tree == {"a": {"b": [1, 2]}}
+    assert (again.source, parse_yaml(text, "other.yaml").source) == ("s.yaml", "other.yaml")
+
+
+def test_a_value_that_was_given_before_is_one_of_its_own():
+    document = parse_yaml("a: 1\n", "s.yaml")
+    first = set_value(document, "b=[1, 2]")
+    first.tree["b"].append(3)
+    assert set_value(document, "b=[1, 2]").tree == {"a": 1, "b": [1, 2]}
