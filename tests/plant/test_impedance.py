@@ -6,7 +6,9 @@ import pytest
 import scipy.signal
 
 import surgsim
-from surgsim.errors import Outcome, ScenarioError
+from surgsim.control.torque_laws.joint_reference import JointReferenceConfig
+from surgsim.env.actions import with_agent
+from surgsim.errors import Outcome, ScenarioError, SurgsimError
 from surgsim.models.build import build
 from surgsim.models.config import RobotConfig, SceneConfig
 from surgsim.models.drive import DriveConfig
@@ -246,3 +248,12 @@ def test_a_run_goes_on_from_a_snapshot_with_the_same_bits():
 def test_what_does_not_fit_is_refused(changes, said):
     with pytest.raises(ScenarioError, match=said):
         surgsim.load("circle_panda", controller="joint_impedance", settings=changes)
+
+
+def test_an_agent_commands_joint_velocities_through_it_and_no_torques():
+    settings = {"robot.drive": OWN, "controller.torque_law": {"type": "joint_reference"}}
+    scenario = surgsim.load("circle_panda", controller="joint_impedance", settings=settings)
+    told = with_agent(scenario, "joint_velocity", None, 1)
+    assert isinstance(told.controller.torque_law, JointReferenceConfig)
+    with pytest.raises(SurgsimError, match="joint_impedance takes no torque"):
+        with_agent(scenario, "torque", None, 1)
