@@ -45,6 +45,11 @@ class Surroundings(Protocol):
         ...
 
     @property
+    def takes_joint_reference(self) -> bool:
+        """Whether the arm's own impedance loop is commanded joint positions."""
+        ...
+
+    @property
     def rolls_instrument(self) -> bool:
         """Whether the task needs the instrument to be rolled."""
         ...

@@ -104,5 +104,9 @@ class Outcome(enum.Enum):
     INCISION_TORN = "The shaft pressed on the abdominal wall harder than the incision bears."
     FORCE_LIMIT = "A force on trocar or tip passed its limit."
     TORQUE_RATE_LIMIT = "The commanded torque changed faster than the arm's interface takes."
+    ACCELERATION_DISCONTINUITY = (
+        "The commanded joint motion had more acceleration or jerk than the arm's interface takes."
+    )
+    COMMUNICATION_CONSTRAINTS_VIOLATION = "Too many commands in a row did not reach the arm."
     INFEASIBLE = "The controller found no command that meets its hard constraints."
     EXTERNAL_FAILED = "The external controller ended, did not answer, or gave what is no answer."

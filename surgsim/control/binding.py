@@ -81,10 +81,12 @@ def new_control(
     limit_zone_rad: float,
     adds_avoidance: bool,
     at_reference: bool,
+    commands_reference: bool = False,
 ) -> Control:
     """The record of a controller's tick; `arm` must outlive it."""
     c = new(Control, arm.limits.q_min.size)
     c.has_law, c.at_reference, c.corrects = has_law, at_reference, corrects
+    c.commands_reference = commands_reference
     c.command.budget_j, c.adds_avoidance = np.inf, adds_avoidance
     for seen in (c.seen, c.referred):
         fill_constants(

@@ -154,6 +154,7 @@ class Controller:
             limit_zone_rad=config.limit_zone_rad,
             adds_avoidance=shares_null_space(config.resolver),
             at_reference=config.evaluate_at == "reference",
+            commands_reference=getattr(parts.law, "commands_reference", False),
         )
         self._bound = bind(self.parts, self.control, arm)
         self._decide = as_parameter(decide, decide_signature(arm.limits.q_min.size))

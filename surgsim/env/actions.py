@@ -14,6 +14,7 @@ from surgsim.control.resolvers.base import ResolverConfig
 from surgsim.control.resolvers.pinv import PinvConfig
 from surgsim.control.resolvers.policy import PolicyConfig
 from surgsim.control.torque_laws.joint_impedance import JointImpedanceConfig
+from surgsim.control.torque_laws.joint_reference import JointReferenceConfig
 from surgsim.control.torque_laws.policy import PolicyLawConfig
 from surgsim.errors import SurgsimError, unknown_name
 from surgsim.models.build import JointLimits
@@ -58,6 +59,8 @@ def with_agent(
         raise SurgsimError(f"a resolver is for tip velocities, not for the action '{action}'")
     if action == "torque" and not scenario.plant.uses_torque:
         raise SurgsimError(f"the '{scenario.plant.type}' plant takes no torque: choose another action")
+    if action == "torque" and scenario.takes_joint_reference:
+        raise SurgsimError("robot.drive.command joint_impedance takes no torque: choose another action")
     own = scenario.controller
     asked: ResolverConfig = PinvConfig()  # with torques, its answer is recorded and not used
     law = own.torque_law
@@ -66,7 +69,8 @@ def with_agent(
     elif action == "joint_velocity":
         asked = PolicyConfig(name=AGENT, action=action, decimation=decimation)
         # other laws hold the RCM and would resist joint velocities that do not
-        law = law if law is None or isinstance(law, JointImpedanceConfig) else JointImpedanceConfig()
+        follows = law is None or isinstance(law, JointImpedanceConfig | JointReferenceConfig)
+        law = law if follows else JointImpedanceConfig()
     else:
         inner: Any = _inner(own.resolver if resolver is None else resolver)
         asked = PolicyConfig(name=AGENT, action=action, resolver=inner, decimation=decimation)

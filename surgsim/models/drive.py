@@ -25,7 +25,7 @@ from pydantic import Field, NonNegativeFloat, PositiveFloat
 from ruamel.yaml import YAML, YAMLError
 
 from surgsim.array import Array
-from surgsim.catalog import PartConfig
+from surgsim.catalog import ADDED, PartConfig
 
 FILE = "drive.yaml"
 """In a robot's folder: what its real drives are."""
@@ -62,6 +62,15 @@ class DriveConfig(PartConfig):
         past_torque_rate: What the interface does with a faster one: `clip` it, `stop` the run with an outcome
             as the arm's reflex, or `ignore` it.
         command_cutoff_hz: Cut-off of the interface's low-pass of the commanded torque [Hz]; null: none.
+        command: What the arm is commanded: joint `torque`, or joint positions for its own impedance loop,
+            with a torque beside them (`joint_impedance`).
+        impedance_stiffness_nm_per_rad: K_j of that loop [N m/rad].
+        impedance_damping_ratio: zeta of its damping D_j = 2 zeta sqrt(K_j M_jj).
+        joint_acceleration_rad_per_s2: Largest commanded joint acceleration that the interface takes
+            [rad/s^2]; null: any.
+        joint_jerk_rad_per_s3: Largest commanded joint jerk that it takes [rad/s^3]; null: any.
+        past_joint_motion: What it does with more: `clip` it, `stop` the run with an outcome as the arm's
+            reflex, or `ignore` it.
 
     Example:
         >>> DriveConfig(stiffness_nm_per_rad=1e4, rotor_inertia_kg_m2=0.6).inertia_shaping
@@ -89,12 +98,24 @@ class DriveConfig(PartConfig):
     torque_rate_nm_per_s: PositiveFloat | None = None
     past_torque_rate: Literal["clip", "stop", "ignore"] = "clip"
     command_cutoff_hz: PositiveFloat | None = None
+    command: Annotated[Literal["torque", "joint_impedance"], ADDED] = "torque"
+    impedance_stiffness_nm_per_rad: Annotated[Positive, ADDED] = 1000.0
+    impedance_damping_ratio: Annotated[NotNegative, ADDED] = 0.7
+    joint_acceleration_rad_per_s2: Annotated[Positive | None, ADDED] = None
+    joint_jerk_rad_per_s3: Annotated[Positive | None, ADDED] = None
+    past_joint_motion: Annotated[Literal["clip", "stop", "ignore"], ADDED] = "clip"
+
+    @property
+    def impedes(self) -> bool:
+        """Whether the arm's own impedance loop is commanded."""
+        return self.command == "joint_impedance"
 
     def on(self, real: "DriveConfig | None") -> Self:
         """These drives, with what is not given here as in `real`.
 
         Raises:
-            ValueError: If stiffness or inertia is known from neither, or static is below dry friction.
+            ValueError: If stiffness or inertia is known from neither, static is below dry friction, or joint
+                motion is limited where none is commanded.
         """
         given = {key: getattr(self, key) for key in self.model_fields_set}
         every = {} if real is None else {key: getattr(real, key) for key in real.model_fields_set}
@@ -104,6 +125,9 @@ class DriveConfig(PartConfig):
                 raise ValueError(f"give {key}: the robot's folder has no {FILE} that says it")
         if whole.static_nm is not None and _below(whole.static_nm, whole.coulomb_nm):
             raise ValueError(f"static_nm {whole.static_nm} must be at least coulomb_nm {whole.coulomb_nm}")
+        for key in ("joint_acceleration_rad_per_s2", "joint_jerk_rad_per_s3"):
+            if getattr(whole, key) is not None and not whole.impedes:
+                raise ValueError(f"{key} is of commanded joint positions: it needs command joint_impedance")
         return whole
 
     def check_lengths(self, n: int) -> None:
@@ -130,11 +154,30 @@ class DriveConfig(PartConfig):
             apparent_inertia=apparent,
             loop_damping=2.0 * self.loop_damping_ratio * np.sqrt(stiffness * apparent),
             torque_rate=float(rate),
+            impedance=self._impedance(n) if self.impedes else None,
         )
+
+    def _impedance(self, n: int) -> "Impedance":
+        """The arm's own impedance loop of `n` joints."""
+        stiffness = self.each("impedance_stiffness_nm_per_rad", n)
+        return Impedance(stiffness=stiffness, damping_ratio=self.each("impedance_damping_ratio", n))
 
     def each(self, key: str, n: int) -> Array:
         """The numbers of a key for `n` joints (n,)."""
         return np.broadcast_to(np.array(getattr(self, key), dtype=np.float64), (n,)).copy()
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Impedance:
+    """What a controller may know of the arm's own impedance loop. Arrays (n,).
+
+    Attributes:
+        stiffness: K_j [N m/rad].
+        damping_ratio: zeta.
+    """
+
+    stiffness: Array
+    damping_ratio: Array
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -148,6 +191,7 @@ class Drive:
         apparent_inertia: B_s [kg m^2].
         loop_damping: D_s [N m s/rad].
         torque_rate: Fastest change of the commanded torque [N m/s].
+        impedance: The arm's own impedance loop; None where torque is commanded.
     """
 
     stiffness: Array
@@ -156,6 +200,7 @@ class Drive:
     apparent_inertia: Array
     loop_damping: Array
     torque_rate: float
+    impedance: Impedance | None = None
 
 
 def real_drive(folder: Path) -> DriveConfig | None:

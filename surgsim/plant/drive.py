@@ -25,6 +25,9 @@ The joints b of a shaft that bends are moved as MuJoCo moves them, by the forces
 damping D_b in A = M_bb + h D_b. For the arm's joints a, M and r are then M_aa - M_ab A^-1 M_ba and
 r_a - M_ab A^-1 r_b.
 
+Where the arm is commanded joint positions, its own impedance loop gives the torque loop its torque, once a
+substep (`surgsim.plant.impedance`). What is commanded besides is then added.
+
 Drives: `surgsim.models.drive`.
 """
 
@@ -38,11 +41,13 @@ import numpy as np
 from surgsim.array import Array
 from surgsim.columns import joints, scalar
 from surgsim.compiled import compiled
-from surgsim.models.build import Scene
+from surgsim.models.build import Scene, build_arm
+from surgsim.models.config import SceneConfig
 from surgsim.models.drive import DriveConfig
 from surgsim.models.robot import joint_names, motor_names
 from surgsim.plant.disturbances.base import copied, spread_factor
 from surgsim.plant.dry_friction import rub
+from surgsim.plant.impedance import CLIP, IGNORE, STOP, begin_at, evaluate, follow
 from surgsim.plant.part import PlantPart
 from surgsim.plant.shaft import bend_joints
 from surgsim.tick.algebra import back_substitute, back_substitute_rows, factor, times
@@ -58,7 +63,7 @@ LOOP_S = 1e-4
 LAST = 10
 """Rank in the chain of `actuate`: what arrives at the drives."""
 _BEFORE_ALL = -1
-CLIP, STOP, IGNORE = range(3)
+_PAST = {"clip": CLIP, "stop": STOP, "ignore": IGNORE}
 
 
 class Law(Record):
@@ -76,6 +81,12 @@ class Law(Record):
         bends: Joints of a shaft that bends, which follow the arm's.
         rubs: Whether links have dry friction.
         damping: Address of the damping of all joints.
+        impedes: Whether the arm's own impedance loop may be commanded.
+        past_motion: What becomes of a joint motion past its limits.
+        mj_model: Address of the arm's own model; as the next three, 0 where it does not impede.
+        mj_data: Of its data.
+        qpos: Of the positions in them.
+        qvel: Of the velocities.
         h: Physics step [s].
         ratio: B / B_s.
         keep: Share of the motor's torque that is kept over a substep, exp(-2 pi f h_s).
@@ -97,6 +108,12 @@ class Law(Record):
     bends: int
     rubs: int
     damping: int
+    impedes: int
+    past_motion: int
+    mj_model: int
+    mj_data: int
+    qpos: int
+    qvel: int
     h: float
     ratio: float
     keep: float
@@ -111,7 +128,9 @@ class Account(Record):
     """Beginning of the memory: energies since the start [J], and what was told; after it the rows (n,).
 
     Attributes:
-        told: Whether a torque that changed too fast was told.
+        told: Whether a reflex was told.
+        refers: Whether the arm's own impedance loop acts.
+        passed: Substeps since the command.
         work: Of the motors' torques.
         loss: In friction, ripple and gears.
         given: To the links.
@@ -120,6 +139,8 @@ class Account(Record):
     """
 
     told: int
+    refers: int
+    passed: int
     work: float
     loss: float
     given: float
@@ -131,12 +152,16 @@ LAW, LAW_SIZE = overlay(Law)
 ACCOUNT, ACCOUNT_SIZE = overlay(Account)
 STIFFNESS, GEAR, ROTOR, LOOP, COULOMB, STATIC, VISCOUS, RIPPLE = range(8)
 BIAS, WAVE, LINK_DAMPING, LINK_DRY = range(8, 12)
-"""Rows of the gains: K, D, B, D_s, friction, ripple, the torque sensor's bias and ripple; of the links."""
+IMPEDANCE, RATIO, FASTEST, JERKIEST, LIMIT = range(12, 17)
+"""Rows of the gains: K, D, B, D_s, friction, ripple, the torque sensor's bias and ripple; of the links; of
+the arm's own impedance K_j and zeta, limits of commanded acceleration and jerk, limits of the torque."""
 THETA, OMEGA, MOTOR, COMMAND, OTHERS, FRICTION, MOVED, TAKEN, RUBBED = range(9)
+BEGIN, TARGET, SPEED, ACCELERATION, HOLDING, MODEL, IMPEDED = range(9, 16)
 """Rows of the memory: motor's position and speed, its torque, the command that acts, other forces on the
 links, friction as observed, the links' correction of a step, friction and ripple as they are, dry friction of
-the links."""
-_ROWS = 9
+the links; of the arm's own loop the reference's begin and end in this period, its speed and acceleration,
+D_j, the bias, and the torque that it gives."""
+_ROWS = 16
 """After them the inertia of all joints (nv, nv), the other forces on those of a shaft that bends, and the
 sensed torques and gear speeds of the last substeps (delay + 1, 2, n)."""
 
@@ -154,10 +179,13 @@ def receive(gains: Array, world: World, memory: Array, out: Array) -> int:
     """
     law, account, n = gains[:LAW_SIZE].view(LAW)[0], memory[:ACCOUNT_SIZE].view(ACCOUNT)[0], world.q.size
     acting = _row(memory, ACCOUNT_SIZE, COMMAND, n)
-    status = GOES_ON
+    status, begins = GOES_ON, world.tick == 0
+    if law.impedes:
+        begins = begins or (account.refers == 0 and not math.isnan(world.q_cmd[0]))
+        status = _take_reference(gains, law, account, world, memory)
     for i in range(n):
         wanted = law.command_keep * acting[i] + (1.0 - law.command_keep) * world.torque[i]
-        if world.tick == 0:
+        if begins:
             wanted = world.torque[i]
         elif law.past_rate == CLIP or account.told:
             wanted = min(max(wanted, acting[i] - law.rate), acting[i] + law.rate)
@@ -167,6 +195,62 @@ def receive(gains: Array, world: World, memory: Array, out: Array) -> int:
     if status != GOES_ON:
         account.told = 1
     return status
+
+
+@compiled
+def _take_reference(gains: Array, law: Law, account: Account, world: World, memory: Array) -> int:
+    """Whether the arm's own loop acts in this period, and where its reference goes; the status of a reflex.
+
+    From the loop's last torque on a commanded torque takes over.
+    """
+    n, referred = world.q.size, not math.isnan(world.q_cmd[0])
+    begin, target = _row(memory, ACCOUNT_SIZE, BEGIN, n), _row(memory, ACCOUNT_SIZE, TARGET, n)
+    speed, acceleration = _row(memory, ACCOUNT_SIZE, SPEED, n), _row(memory, ACCOUNT_SIZE, ACCELERATION, n)
+    status = GOES_ON
+    if account.refers and not referred:
+        acting, last = _row(memory, ACCOUNT_SIZE, COMMAND, n), _row(memory, ACCOUNT_SIZE, IMPEDED, n)
+        acting[:] = last
+    elif referred and (world.tick == 0 or not account.refers):
+        begin_at(world.q_cmd, begin, target, speed, acceleration)
+    elif referred:
+        fastest = _row(gains, LAW_SIZE, FASTEST, n)
+        jerkiest = _row(gains, LAW_SIZE, JERKIEST, n)
+        status = follow(
+            CLIP if account.told else law.past_motion,
+            world.dt_s,
+            fastest,
+            jerkiest,
+            world.q_cmd,
+            begin,
+            target,
+            speed,
+            acceleration,
+        )
+    account.refers, account.passed = 1 if referred else 0, 0
+    return status
+
+
+@compiled
+def _impede(
+    gains: Array, law: Law, account: Account, memory: Array, x: Array, v: Array, periods: int
+) -> None:
+    """The arm's own loop: the torque that it gives its torque loop (n,) [N m], from now on for a substep.
+
+    It knows the joints from motors and torque sensors, wherever the encoders are that a controller has.
+    """
+    n = x.size
+    K, stiffness = _row(gains, LAW_SIZE, STIFFNESS, n), _row(gains, LAW_SIZE, IMPEDANCE, n)
+    limit, command = _row(gains, LAW_SIZE, LIMIT, n), _row(memory, ACCOUNT_SIZE, COMMAND, n)
+    theta, omega = _row(memory, ACCOUNT_SIZE, THETA, n), _row(memory, ACCOUNT_SIZE, OMEGA, n)
+    begin, target = _row(memory, ACCOUNT_SIZE, BEGIN, n), _row(memory, ACCOUNT_SIZE, TARGET, n)
+    damping, bias = _row(memory, ACCOUNT_SIZE, HOLDING, n), _row(memory, ACCOUNT_SIZE, MODEL, n)
+    given = _row(memory, ACCOUNT_SIZE, IMPEDED, n)
+    share = (account.passed + 0.5) / (law.substeps * periods)
+    account.passed += 1
+    for i in range(n):
+        q = theta[i] - _felt(gains, law, n, i, theta[i], x[i], omega[i] - v[i]) / K[i]
+        u = stiffness[i] * (begin[i] + share * (target[i] - begin[i]) - q) - damping[i] * omega[i]
+        given[i] = min(max(u + command[i] + bias[i], -limit[i]), limit[i])
 
 
 @compiled
@@ -190,6 +274,11 @@ def move(gains: Array, world: World, memory: Array, out: Array) -> int:
         x[i], v[i] = qpos[world.first_qpos + i], qvel[first + i]
         rest[i] = passive[first + i] - bias[first + i] + others[i]
         mean[i] = gain[i] = momentum[i] = 0.0
+    account = memory[:ACCOUNT_SIZE].view(ACCOUNT)[0]
+    if account.refers:
+        stiffness, ratio = _row(gains, LAW_SIZE, IMPEDANCE, n), _row(gains, LAW_SIZE, RATIO, n)
+        holding, bias = _row(memory, ACCOUNT_SIZE, HOLDING, n), _row(memory, ACCOUNT_SIZE, MODEL, n)
+        evaluate(law.mj_model, law.mj_data, law.qpos, law.qvel, x, v, stiffness, ratio, holding, bias)
     if law.bends > 0 and not _take_out_shaft(
         law, world, whole, memory[tail + nv * nv : tail + nv * nv + law.bends], rest
     ):
@@ -205,6 +294,8 @@ def move(gains: Array, world: World, memory: Array, out: Array) -> int:
         return RANK_LOST
     back_substitute_rows(S, inverse)
     for _ in range(law.substeps):
+        if account.refers:
+            _impede(gains, law, account, memory, x, v, world.substeps)
         _close_loop(gains, law, memory, ring, x, v)
         _push_motors(gains, law, memory, x, v, gain, push)
         _substep(gains, law, memory, inverse, momentum, rest, push, sensed, x, v, gain, mean)
@@ -339,7 +430,9 @@ def _close_loop(gains: Array, law: Law, memory: Array, ring: Array, x: Array, v:
     n = x.size
     loop = _row(gains, LAW_SIZE, LOOP, n)
     theta, omega = _row(memory, ACCOUNT_SIZE, THETA, n), _row(memory, ACCOUNT_SIZE, OMEGA, n)
-    motor, command = _row(memory, ACCOUNT_SIZE, MOTOR, n), _row(memory, ACCOUNT_SIZE, COMMAND, n)
+    account = memory[:ACCOUNT_SIZE].view(ACCOUNT)[0]
+    acting = IMPEDED if account.refers else COMMAND
+    motor, command = _row(memory, ACCOUNT_SIZE, MOTOR, n), _row(memory, ACCOUNT_SIZE, acting, n)
     known = _row(memory, ACCOUNT_SIZE, FRICTION, n)
     for k in range(law.delay, 0, -1):
         for i in range(2 * n):
@@ -420,8 +513,8 @@ def feel(gains: Array, world: World, memory: Array, out: Array) -> int:
 
 @compiled
 def record(gains: Array, world: World, memory: Array, out: Array) -> int:
-    """Columns: the gears' torques, the motors' speeds, energies."""
-    account, n = memory[:ACCOUNT_SIZE].view(ACCOUNT)[0], world.q.size
+    """Columns: the gears' torques, the motors' speeds, energies; the arm's own loop."""
+    law, account, n = gains[:LAW_SIZE].view(LAW)[0], memory[:ACCOUNT_SIZE].view(ACCOUNT)[0], world.q.size
     K, D = _row(gains, LAW_SIZE, STIFFNESS, n), _row(gains, LAW_SIZE, GEAR, n)
     B = _row(gains, LAW_SIZE, ROTOR, n)
     theta, omega = _row(memory, ACCOUNT_SIZE, THETA, n), _row(memory, ACCOUNT_SIZE, OMEGA, n)
@@ -433,6 +526,10 @@ def record(gains: Array, world: World, memory: Array, out: Array) -> int:
         stored += 0.5 * (K[i] * s * s + B[i] * omega[i] * omega[i])
     out[2 * n], out[2 * n + 1], out[2 * n + 2] = account.work, account.loss, stored
     out[2 * n + 3], out[2 * n + 4] = account.given, account.rubbed
+    if law.impedes:
+        target, given = _row(memory, ACCOUNT_SIZE, TARGET, n), _row(memory, ACCOUNT_SIZE, IMPEDED, n)
+        for i in range(n):
+            out[2 * n + 5 + i], out[3 * n + 5 + i] = target[i], given[i]
     return GOES_ON
 
 
@@ -441,11 +538,17 @@ class JointDrives(PlantPart):
 
     Records the gears' torques `joint_torque`, the motors' speeds `motor_speed`, and since the start the work
     of the motors, their loss, the energy in rotors and gears, and that given to the links: work is the sum of
-    the other three. What the links' dry friction takes of the last is beside them.
+    the other three. What the links' dry friction takes of the last is beside them. Where the arm's own
+    impedance loop is commanded, also where its reference is to be, `joint_command`, and its torque,
+    `impedance_torque`.
 
     Args:
         config: The drives, whole: see `DriveConfig.on`.
         rng: From which friction and the signs of the sensors' biases are drawn.
+        nominal: The arm as its own impedance loop knows it; needed where that is commanded.
+
+    Raises:
+        ValueError: If it is needed and not given.
     """
 
     rank = LAST
@@ -458,8 +561,15 @@ class JointDrives(PlantPart):
     }
     ranks: Mapping[str, int] = {"before_step": _BEFORE_ALL, "after_step": _BEFORE_ALL, "sense": 0}
 
-    def __init__(self, config: DriveConfig, rng: np.random.Generator) -> None:
+    def __init__(
+        self, config: DriveConfig, rng: np.random.Generator, nominal: SceneConfig | None = None
+    ) -> None:
         self._c, self._rng = config, rng
+        self._nominal: mujoco.MjData | None = None
+        if config.impedes:
+            if nominal is None:
+                raise ValueError("command joint_impedance needs the arm as its own loop knows it")
+            self._nominal = mujoco.MjData(build_arm(nominal).model)
         self._n, self._damping, self._dry = 0, np.zeros(0), np.zeros(0)
 
     def modify(self, spec: mujoco.MjSpec) -> None:
@@ -483,11 +593,15 @@ class JointDrives(PlantPart):
             joints("motor_speed", "rad_per_s", n),
             *(scalar(f"drive_{name}", "j") for name in ("work", "loss", "stored", "given", "link_friction")),
         )
+        if c.impedes:
+            own = (joints("joint_command", "rad", n), joints("impedance_torque", "nm", n))
+            self.columns = (*self.columns, *own)
         drive, h = c.values(n), scene.model.opt.timestep
         drawn = copied(self._rng)
         spread = spread_factor(drawn, c.friction_spread, n)
         signs = drawn.choice([-1.0, 1.0], n)
         coulomb = c.each("coulomb_nm", n)
+        free = np.full(n, np.inf)
         static = coulomb if c.static_nm is None else c.each("static_nm", n)
         rows = (
             drive.stiffness,
@@ -502,6 +616,11 @@ class JointDrives(PlantPart):
             c.each("sensor_ripple_nm", n),
             self._damping,
             self._dry,
+            c.each("impedance_stiffness_nm_per_rad", n),
+            c.each("impedance_damping_ratio", n),
+            c.each("joint_acceleration_rad_per_s2", n) if c.joint_acceleration_rad_per_s2 else free,
+            c.each("joint_jerk_rad_per_s3", n) if c.joint_jerk_rad_per_s3 else free,
+            scene.limits.torque,
         )
         self.gains = np.concatenate([np.zeros(LAW_SIZE), *rows])
         law = laid_over(Law, self.gains)
@@ -513,7 +632,12 @@ class JointDrives(PlantPart):
         law.observes = -math.expm1(-2.0 * math.pi * c.friction_observer_hz * period)
         law.stribeck, law.waves = c.stribeck_velocity_rad_per_s, float(c.ripple_per_turn)
         law.at_motor = c.encoder == "motor"
-        law.past_rate = {"clip": CLIP, "stop": STOP, "ignore": IGNORE}[c.past_torque_rate]
+        law.past_rate, law.past_motion = _PAST[c.past_torque_rate], _PAST[c.past_joint_motion]
+        law.impedes = c.impedes
+        if self._nominal is not None:
+            data = self._nominal
+            law.mj_model, law.mj_data = data.model._address, data._address
+            law.qpos, law.qvel = data.qpos.ctypes.data, data.qvel.ctypes.data
         law.rate = drive.torque_rate * dt_s
         cutoff = c.command_cutoff_hz
         law.command_keep = 0.0 if cutoff is None else math.exp(-2.0 * math.pi * cutoff * dt_s)

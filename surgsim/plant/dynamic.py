@@ -231,7 +231,7 @@ class DynamicPlant:
         """Forget the last run, and start the parts where the arm now is."""
         world = self.world
         world.tick, world.t_s = 0, 0.0
-        world.f_T[:] = 0.0
+        world.f_T[:], world.q_cmd[:] = 0.0, np.nan
         self._start_parts()
         self._drawn_at[:] = -1.0
         self.refill()
@@ -255,15 +255,18 @@ class DynamicPlant:
             part.start(self._scene, self._data, np.random.default_rng(child), float(self.world.dt_s))
         self._table.fill()
 
-    def step(self, torque: Array, qdot: Array, jaw: float = 0.0) -> State:
+    def step(self, torque: Array, qdot: Array, jaw: float = 0.0, q_cmd: Array | None = None) -> State:
         """Let `torque` (n,) [N m], saturated at the limits, act for one control period.
 
         Args:
             torque: Commanded torque.
             qdot: Not used: the resolver's velocities are for a kinematic plant.
             jaw: How far the instrument's jaws are told to close, from 0 (open) to 1.
+            q_cmd: Joint positions at the end of the period for the arm's own impedance loop (n,) [rad], which
+                adds the torque to its own; None: the torque alone is commanded.
         """
         self.world.torque[:], self.world.qdot[:], self.world.jaw = torque, qdot, jaw
+        self.world.q_cmd[:] = np.nan if q_cmd is None else q_cmd
         self.refill()
         self._told(self._advance(self.world, self.bore, self._table.record))
         return self.state()

@@ -38,6 +38,7 @@ def world_of(
     world.dt_s, world.timestep_s = control_period_s, model.opt.timestep
     world.tau_max[:] = scene.limits.torque
     world.p_WC[:] = world.p_WC_m[:] = world.f_C[:] = np.nan
+    world.q_cmd[:] = np.nan
     world.p_WT_m[:], world.R_WT_m[:] = np.nan, np.nan
     if world.mocap >= 0:
         world.port_home[:] = data.mocap_pos[world.mocap]

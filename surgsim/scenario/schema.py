@@ -198,6 +198,12 @@ class Scenario(PartConfig):
             raise ValueError(f"plant '{self.plant.type}' needs controller.torque_law")
         if self.robot.drives is not None and not self.plant.uses_torque:
             raise ValueError(f"robot.drive does not act on the '{self.plant.type}' plant: leave it ideal")
+        commands = getattr(self.controller.torque_law, "commands_reference", False)
+        if self.takes_joint_reference and not commands:
+            raise ValueError(
+                "robot.drive.command joint_impedance takes joint positions: controller.torque_law must be "
+                "one that commands them, as joint_reference"
+            )
         for key in ("disturbances", "props"):
             if getattr(self, key) and not self.plant.uses_torque:
                 raise ValueError(f"{key} do not act on the '{self.plant.type}' plant: leave them out")
@@ -245,6 +251,11 @@ class Scenario(PartConfig):
         return self.robot.drives is not None
 
     @property
+    def takes_joint_reference(self) -> bool:
+        """Whether the arm's own impedance loop is commanded joint positions."""
+        return self.robot.drives is not None and self.robot.drives.impedes
+
+    @property
     def rolls_instrument(self) -> bool:
         """Whether the task needs the instrument to be rolled."""
         return bool(getattr(self.task, "rolls_instrument", False))
@@ -268,7 +279,9 @@ class Scenario(PartConfig):
         pairs = zip(configs, children, strict=False)
         parts = [config.build(np.random.default_rng(child)) for config, child in pairs]
         drives = self.robot.drives
-        return parts if drives is None else [*parts, JointDrives(drives, np.random.default_rng(children[-1]))]
+        if drives is None:
+            return parts
+        return [*parts, JointDrives(drives, np.random.default_rng(children[-1]), self.scene)]
 
     def run_seed(self) -> np.random.SeedSequence:
         """Where the randomness during a run comes from."""

@@ -19,7 +19,7 @@ from surgsim.tasks.base import Looks, TipCommand
 from surgsim.tasks.binding import BoundTask
 from surgsim.tasks.command import command_of
 from surgsim.tick.arrays import OUT_OF_TIME, Control, Record, World, new, point
-from surgsim.tick.status import TORQUE_RATE
+from surgsim.tick.status import JOINT_ACCELERATION, JOINT_JERK, PACKETS_LOST, TORQUE_RATE
 from surgsim.trace.trace import Ending, Trace, TraceMeta, base_blocks
 
 Progress = Callable[[float, float], None]
@@ -27,6 +27,24 @@ Progress = Callable[[float, float], None]
 
 _CLOCK_EVERY = 8
 _NO_STOP = StopConfig(duration_s=0.0)
+_REFLEXES = {
+    TORQUE_RATE: (Outcome.TORQUE_RATE_LIMIT, "asks for more than robot.drive's torque_rate_nm_per_s"),
+    JOINT_ACCELERATION: (
+        Outcome.ACCELERATION_DISCONTINUITY,
+        "asks for more than robot.drive's joint_acceleration_rad_per_s2",
+    ),
+    JOINT_JERK: (
+        Outcome.ACCELERATION_DISCONTINUITY,
+        "asks for more than robot.drive's joint_jerk_rad_per_s3",
+    ),
+    PACKETS_LOST: (
+        Outcome.COMMUNICATION_CONSTRAINTS_VIOLATION,
+        "is the last of as many lost in a row as late_ticks' stop_after_ticks",
+    ),
+}
+"""What a status of the plant is to a run, and the words for it."""
+REFLEXES = frozenset(outcome for outcome, _ in _REFLEXES.values())
+"""Outcomes by which the arm's interface ends a run; told once, and the stop goes on."""
 
 
 def ticks_of(setup: Setup) -> int:
@@ -167,9 +185,9 @@ class ArmRun:
             return self.done_at(t_s)
         if reason == TASK_TOLD:
             raise self.task.raised() or _stopped(self.setup.scenario.task.type, status)
-        if status == TORQUE_RATE:
-            detail = f"the command at {t_s:.3f} s asks for more than robot.drive's torque_rate_nm_per_s"
-            return Ending(outcome=Outcome.TORQUE_RATE_LIMIT, t_s=t_s, detail=detail)
+        if status in _REFLEXES:
+            outcome, said = _REFLEXES[status]
+            return Ending(outcome=outcome, t_s=t_s, detail=f"the command at {t_s:.3f} s {said}")
         raise self.setup.plant.hooks.raised() or _stopped("a disturbance or prop", status)
 
     @property

@@ -4,9 +4,8 @@ import mujoco
 
 from surgsim.array import Array
 from surgsim.compiled import as_parameter
-from surgsim.errors import Outcome
 from surgsim.scenario.schema import Scenario
-from surgsim.simulate.arm_run import ArmRun, stop_ticks_of, ticks_of
+from surgsim.simulate.arm_run import REFLEXES, ArmRun, stop_ticks_of, ticks_of
 from surgsim.simulate.setup import Setup
 from surgsim.simulate.ticks import (
     GOING,
@@ -83,7 +82,7 @@ class OneArm:
         if run.progress.reason == PLANT_TOLD:
             run.progress.reason = GOING
             told = self._arm.ending(PLANT_TOLD, int(run.progress.status))
-            return done, told.outcome is Outcome.TORQUE_RATE_LIMIT  # told once; the stop goes on
+            return done, told.outcome in REFLEXES  # told once; the stop goes on
         return done, done == ticks
 
     def records(self) -> dict[str, tuple[Record, type[Record]]]:

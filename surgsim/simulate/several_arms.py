@@ -14,7 +14,7 @@ from surgsim.errors import Outcome
 from surgsim.plant.between import Between
 from surgsim.plant.several import SeveralPlants, Shared
 from surgsim.scenario.arms import ArmsScenario
-from surgsim.simulate.arm_run import ArmRun, stop_ticks_of, ticks_of
+from surgsim.simulate.arm_run import REFLEXES, ArmRun, stop_ticks_of, ticks_of
 from surgsim.simulate.arms_setup import ArmsSetup
 from surgsim.simulate.arms_ticks import (
     ENTRY,
@@ -118,7 +118,7 @@ class SeveralArms:
         self._record.reason = GOING
         done = int(self._hold(ticks, self._record, self._plants.record, self._watch.record))
         if self._record.reason == PLANT_TOLD:
-            return done, self._ending().outcome is Outcome.TORQUE_RATE_LIMIT  # told once; the stop goes on
+            return done, self._ending().outcome in REFLEXES  # told once; the stop goes on
         return done, done == ticks
 
     def records(self) -> dict[str, tuple[Record, type[Record]]]:

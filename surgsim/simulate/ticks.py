@@ -241,8 +241,17 @@ def ask_task(run: Run, c: Control, world: World) -> int:
 def _tell(world: World, torque: Array, qdot: Array, jaw: float) -> None:
     """Hand the command to the plant."""
     for i in range(torque.size):
-        world.torque[i], world.qdot[i] = torque[i], qdot[i]
+        world.torque[i], world.qdot[i], world.q_cmd[i] = torque[i], qdot[i], math.nan
     world.jaw = jaw
+
+
+@compiled
+def _refer(world: World, c: Control) -> None:
+    """Hand the arm's own loop the joint reference as it will be at the end of the period."""
+    seen = c.seen
+    for i in range(world.q_cmd.size):
+        moved = c.q_ref[i] + seen.dt_s * c.resolved.qdot[i]
+        world.q_cmd[i] = min(max(moved, seen.q_min[i]), seen.q_max[i])
 
 
 @compiled
@@ -288,9 +297,11 @@ def decide_tick(
         p.infeasible = 0
         stop.begun = 0
         _record(run, row, c, world.tau_max, took)
-        if not _is_finite(c.torque):
+        if not _is_finite(c.torque) or (c.commands_reference and not _is_finite(c.resolved.qdot)):
             return NOT_FINITE
         _tell(world, c.torque, c.resolved.qdot, c.command.jaw)
+        if c.commands_reference:
+            _refer(world, c)
         return DONE if _is_last(p, c, world) else GOING
     row[at.infeasible] = 1.0 if _has_no_answer(status) else 0.0
     if status == TOLD or not _bridges(p, c, world, status):

@@ -493,6 +493,8 @@ class Control(Record):
     Attributes:
         has_law: Whether there is a torque law, else 0.
         at_reference: Whether the resolver's kinematics are those of the joint reference.
+        commands_reference: Whether the arm's own impedance loop is given the joint reference, and the law's
+            torque beside it.
         corrects: Whether the instrument estimator may correct the nominal model.
         who: Written: the part that a status other than GOES_ON came from.
         adds_avoidance: Whether null-space motion away from joint limits is added to the resolver's answer.
@@ -518,6 +520,7 @@ class Control(Record):
     }
     has_law: int
     at_reference: int
+    commands_reference: int
     corrects: int
     who: int
     adds_avoidance: int
@@ -593,6 +596,8 @@ class World(Record):
         tau_max: Torque limits (n,) [N m].
         torque: Torque on its way to the joints (n,) [N m].
         qdot: The resolver's velocities (n,) [rad/s].
+        q_cmd: Joint positions at the end of the period on their way to the arm's own impedance loop (n,)
+            [rad]; NaN: there are none, the torque is the command; infinite: no command arrived.
         q: True joint positions (n,) [rad].
         v: True joint velocities (n,) [rad/s].
         tau: Torque that the actuators gave over the last period (n,) [N m].
@@ -618,7 +623,10 @@ class World(Record):
     """
 
     SHAPES: ClassVar[dict[str, str]] = {
-        **{name: "n" for name in ("tau_max", "torque", "qdot", "q", "v", "tau", "q_m", "v_m", "tau_m")},
+        **{
+            name: "n"
+            for name in ("tau_max", "torque", "qdot", "q_cmd", "q", "v", "tau", "q_m", "v_m", "tau_m")
+        },
         **{name: "3" for name in ("p_WT", "p_WS", "p_WR", "p_WC", "f_C", "f_T", "p_WC_m", "v_WC_m", "f_T_m")},
         **{name: "3" for name in ("port_home", "port_offset", "port_velocity")},
         **{name: "3" for name in ("f_S_m", "m_S_m", "p_WT_m")},
@@ -702,6 +710,7 @@ class World(Record):
     tau_max: Array
     torque: Array
     qdot: Array
+    q_cmd: Array
     q: Array
     v: Array
     tau: Array

@@ -13,3 +13,9 @@ TORQUE_RATE = 5
 """The commanded torque changes faster than the arm's interface takes."""
 EXTERNAL = 6
 """A controller outside surgsim gave no answer (`surgsim.control.external`)."""
+JOINT_ACCELERATION = 7
+"""The commanded joint motion accelerates more than the arm's interface takes."""
+JOINT_JERK = 8
+"""The commanded joint motion has more jerk than the arm's interface takes."""
+PACKETS_LOST = 9
+"""So many commands in a row were lost that the arm gives up."""

@@ -105,7 +105,7 @@ WRONG = {
     "unknown scenario": (["run", "circel_lwr4plus"], "'circel_lwr4plus' is not a shipped scenario. Known: "),
     "unknown safety scenario": (
         ["run", "safety/tip_limt"],
-        "'safety/tip_limt' is not a shipped scenario. Known: safety/arm_collision, ",
+        "'safety/tip_limt' is not a shipped scenario. Known: safety/acceleration_discontinuity, ",
     ),
     "unknown controller": (
         ["run", "circle_lwr4plus", "--controller", "vprn"],

@@ -102,6 +102,11 @@ SLOW = (
 RIGID = (
     "surgsim run circle_panda --controller rcm_inverse_dynamics --set robot.drive=real --out runs/rigid_law"
 )
+LOST = (
+    "surgsim run circle_panda --controller joint_impedance "
+    "--set 'disturbances=[{type: late_ticks, probability: 0.003, burst_ticks: 40, stop_after_ticks: 20}]' "
+    "--set seed=15 --out runs/lost"
+)
 NO_PREDICTION = (
     "surgsim run circle_lwr4plus --controller rcm_inverse_dynamics "
     "--set controller.torque_law.rcm_stiffness_per_s2=20000 "
@@ -111,6 +116,7 @@ NO_PREDICTION = (
 )
 STATUS = {
     RIGID: 1,  # a law that takes the drives for ideal
+    LOST: 1,  # twenty commands in a row are lost
     NO_PREDICTION: 1,  # past the frontier: the run is stopped, as the page says
     "surgsim compare seeds --out runs/seeds --shard 1/2": 1,  # the other shard is missing
 }

@@ -15,6 +15,13 @@ from surgsim.scenario.load import load_experiment
 from surgsim.teleop.sight import SightConfig
 
 LATER: dict[tuple[str, str], object] = {
+    ("DriveConfig", "command"): "torque",
+    ("DriveConfig", "impedance_damping_ratio"): 0.7,
+    ("DriveConfig", "impedance_stiffness_nm_per_rad"): 1000.0,
+    ("DriveConfig", "joint_acceleration_rad_per_s2"): None,
+    ("DriveConfig", "joint_jerk_rad_per_s3"): None,
+    ("DriveConfig", "past_joint_motion"): "clip",
+    ("LateTicksConfig", "stop_after_ticks"): None,
     ("OperatorConfig", "sight"): SightConfig(
         use=False, across_m=0.0007, depth_m=0.001, line_of_sight=(0.0, 0.5, -1.0), corrections=3
     ),

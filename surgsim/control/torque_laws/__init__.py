@@ -12,6 +12,7 @@ TORQUE_LAWS = Catalog(
         "hierarchical_qp": f"{__name__}.hierarchical_qp:HierarchicalQpConfig",
         "joint_elastic_dynamics": f"{__name__}.joint_elastic_dynamics:JointElasticDynamicsConfig",
         "joint_impedance": f"{__name__}.joint_impedance:JointImpedanceConfig",
+        "joint_reference": f"{__name__}.joint_reference:JointReferenceConfig",
         "null_space_basis": f"{__name__}.null_space_basis:NullSpaceBasisConfig",
         "policy": f"{__name__}.policy:PolicyLawConfig",
         "projected_jacobian": f"{__name__}.projected_jacobian:ProjectedJacobianConfig",

@@ -125,6 +125,8 @@ class KernelTorqueLaw:
             function of what the kernel saw.
         inside: What the kernel enters in Python.
         outside: What answers the kernel from outside surgsim, to be ended with the run.
+        commands_reference: Whether the arm's own impedance loop is given the joint reference, and adds the
+            terms to its own torque.
     """
 
     kernel: TorqueKernel
@@ -135,6 +137,7 @@ class KernelTorqueLaw:
     failures: Mapping[int, Words] = field(default_factory=dict)
     inside: Inside | None = None
     outside: Elsewhere | None = None
+    commands_reference: bool = False
 
     def start(self, problem: TorqueProblem) -> None:
         """The kernel makes its own memory at the first tick."""

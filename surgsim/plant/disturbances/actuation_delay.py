@@ -1,5 +1,6 @@
 """Torques that act later than commanded."""
 
+import math
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal
 
@@ -19,7 +20,8 @@ from surgsim.tick.status import GOES_ON
 DELAY, ROOM = 0, 1
 """Gains: d in ticks, and how many commands can be on the line."""
 OLDEST, ACTING = 0, 1
-"""Memory: the oldest command on the line, the torque that acts (n,); then jitter, arrivals and torques."""
+"""Memory: the oldest command on the line, the torque that acts (n,); then jitter, arrivals, torques, and the
+joint positions with them."""
 
 
 @compiled
@@ -28,16 +30,19 @@ def carry(gains: Array, world: World, memory: Array, out: Array) -> int:
 
     Command k arrives at tick a_k = max(k + d + j_k, a_{k-1}) with the delay d and the jitter j_k in ticks.
     Of those that arrive in one tick the newest acts; it holds until another arrives. Before the first arrives
-    it acts already: the arm was being held before.
+    it acts already: the arm was being held before. Joint positions for the arm's own loop arrive with it;
+    where none arrive in a tick, that is said.
     """
     n, k, room = world.torque.size, world.tick, int(gains[ROOM])
     begin = ACTING + n + BLOCK_TICKS
     acting, jitter = memory[ACTING : ACTING + n], memory[ACTING + n : begin]
     arrivals, torques = memory[begin : begin + room], memory[begin + room :]
+    references, arrived = torques[room * n :], k == 0
     at = k % room
     arrivals[at] = max(k + gains[DELAY] + jitter[k % BLOCK_TICKS], arrivals[(k - 1) % room])
     for i in range(n):
         torques[at * n + i] = world.torque[i]
+        references[at * n + i] = world.q_cmd[i]
         if k == 0:
             acting[i] = world.torque[i]
     while memory[OLDEST] <= k and arrivals[int(memory[OLDEST]) % room] <= k:
@@ -45,8 +50,13 @@ def carry(gains: Array, world: World, memory: Array, out: Array) -> int:
         for i in range(n):
             acting[i] = torques[at * n + i]
         memory[OLDEST] += 1.0
+        arrived = True
+    latest = (max(int(memory[OLDEST]) - 1, 0) % room) * n
     for i in range(n):
         world.torque[i] = acting[i]
+        world.q_cmd[i] = references[latest + i]
+        if not (arrived or math.isnan(world.q_cmd[i])):
+            world.q_cmd[i] = math.inf
     return GOES_ON
 
 
@@ -94,7 +104,7 @@ class ActuationDelay(Disturbance):
         room = ticks + self._jitter + 2
         self._first = ACTING + n
         self.gains = np.array([float(ticks), float(room)])
-        self.memory = np.zeros(self._first + BLOCK_TICKS + room * (1 + n))
+        self.memory = np.zeros(self._first + BLOCK_TICKS + room * (1 + 2 * n))
 
     def start(self, scene: Scene, data: mujoco.MjData, rng: np.random.Generator, dt_s: float) -> None:
         """Draw from the beginning."""

@@ -10,8 +10,8 @@ N = 20000
 
 def _acting(disturbed, seed=0, **keys):
     """Number of the command that acts at each tick."""
-    late = disturbed.started(LateTicksConfig(**keys), seed).part
-    return np.array([late.actuate(np.full(7, float(k)))[0] for k in range(N)])
+    late = disturbed.started(LateTicksConfig(**keys), seed)
+    return late.actuate(np.tile(np.arange(float(N))[:, None], 7))[:, 0].astype(int)
 
 
 @pytest.mark.parametrize(("probability", "burst"), [(0.05, 1), (0.02, 4), (0.5, 2)])
