@@ -50,7 +50,7 @@ class AdaptiveDecouplingConfig(RcmTasksConfig):
     """
 
     type: Literal["adaptive_decoupling"] = "adaptive_decoupling"
-    adaptation_per_s2: NonNegativeFloat = 2000.0
+    adaptation_per_s2: NonNegativeFloat = 1000.0
     leakage_per_s: NonNegativeFloat = 0.05
     nodes: Annotated[int, Field(ge=1, le=50)] = 7
     slowest_rad_per_s: PositiveFloat = 0.005

@@ -56,8 +56,8 @@ class RcmSlidingModeConfig(PartConfig):
     joint_slope_per_s: PositiveFloat = 10.0
     joint_reach_rad_per_s2: PositiveFloat = 5.0
     joint_layer_rad_per_s: PositiveFloat = 0.5
-    drive_slope_share: PositiveFloat = 0.15
-    drive_layer_share: PositiveFloat = 0.2
+    drive_slope_share: PositiveFloat = 0.12
+    drive_layer_share: PositiveFloat = 0.12
 
     def build(self, arm: ArmModel) -> KernelTorqueLaw:
         """The law; its memory is the integrals of the errors."""
