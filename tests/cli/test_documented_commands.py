@@ -79,6 +79,12 @@ SHORTER = {
     "surgsim compare peg_and_ring --out runs/peg_and_ring": (
         f"{SHORT} --set task.time_limit_s=3.0 --seeds 0:1"
     ),
+    "surgsim compare random_lwr4plus random_panda random_fr3 random_iiwa14 --controllers rcm_sliding_mode "
+    "--seeds 0:3 --set robot.drive=real --set disturbances.1.coulomb_nm=0.0 "
+    "--set controller.torque_law.drive_layer_share=0.6 --out runs/layer": f"{SHORT} --seeds 1",
+    "surgsim compare random_lwr4plus random_panda random_fr3 random_iiwa14 --controllers adaptive_decoupling "
+    "--seeds 0:3 --set robot.drive=real --set disturbances.1.coulomb_nm=0.0 "
+    "--set controller.torque_law.nodes=1 --out runs/one_node": f"{SHORT} --seeds 1",
     "surgsim compare frontier --seeds 0:1 --out runs/frontier": "--controllers rcm_inverse_dynamics",
     "surgsim compare torque_level --out runs/torque_level": "--controllers rcm_inverse_dynamics",
     "surgsim tune joint_impedance --scenario theatre_lwr4plus --budget 60 --out tuned": f"{SHORT} --budget 6",

@@ -272,6 +272,8 @@ def test_the_full_suite_leaves_nothing_out():
         "joint_elastic_dynamics",
         "joint_impedance_tuned",
         "rcm_mpc",
+        "rcm_sliding_mode",
+        "adaptive_decoupling",
     }  # for real drives
     elsewhere |= {
         "constraint_consistent",

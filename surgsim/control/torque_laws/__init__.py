@@ -6,6 +6,7 @@ TORQUE_LAWS = Catalog(
     "torque law",
     "surgsim.torque_laws",
     {
+        "adaptive_decoupling": f"{__name__}.adaptive_decoupling:AdaptiveDecouplingConfig",
         "constraint_consistent": f"{__name__}.constraint_consistent:ConstraintConsistentConfig",
         "external": f"{__name__}.external:ExternalLawConfig",
         "hierarchical_impedance": f"{__name__}.hierarchical_impedance:HierarchicalImpedanceConfig",
@@ -19,5 +20,6 @@ TORQUE_LAWS = Catalog(
         "rcm_elastic_dynamics": f"{__name__}.rcm_elastic_dynamics:RcmElasticDynamicsConfig",
         "rcm_inverse_dynamics": f"{__name__}.rcm_inverse_dynamics:RcmInverseDynamicsConfig",
         "rcm_mpc": f"{__name__}.rcm_mpc:RcmMpcConfig",
+        "rcm_sliding_mode": f"{__name__}.rcm_sliding_mode:RcmSlidingModeConfig",
     },
 )

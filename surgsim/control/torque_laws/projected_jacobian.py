@@ -7,18 +7,11 @@ import numpy as np
 from surgsim.array import Array
 from surgsim.compiled import compiled
 from surgsim.control.torque_laws.base import KernelTorqueLaw
+from surgsim.control.torque_laws.decoupled import task_torque
 from surgsim.control.torque_laws.hierarchical_impedance import project_torque
 from surgsim.control.torque_laws.rcm_tasks import OWN_GAINS, RcmTasksConfig, wanted
 from surgsim.models.arm import ArmModel
-from surgsim.tick.algebra import (
-    back_substitute,
-    back_substitute_rows,
-    dot,
-    factor,
-    outer_product,
-    times,
-    transposed_times,
-)
+from surgsim.tick.algebra import back_substitute_rows, dot, factor, times
 from surgsim.tick.arrays import Seen
 from surgsim.tick.scratch import scratch, scratch_matrix
 from surgsim.tick.status import GOES_ON, RANK_LOST
@@ -73,7 +66,7 @@ def projected_jacobian(gains: Array, seen: Seen, memory: Array, out: Array) -> i
     if not factor(L):
         return RANK_LOST
     back_substitute_rows(L, moved)
-    if not _force(J[3:], moved[3:], a[3:], out[RCM]):
+    if not task_torque(J[3:], moved[3:], a[3:], out[RCM]):
         return RANK_LOST
     dynamic = gains[DYNAMIC] != 0.0
     weighted, below, reached = scratch_matrix(3 + r, n), scratch_matrix(3, n), scratch(3)
@@ -82,28 +75,9 @@ def projected_jacobian(gains: Array, seen: Seen, memory: Array, out: Array) -> i
         reached[i] = a[i] - dot(moved[i], out[RCM])
         if dynamic and r > 0 and not project_torque(J[3:], moved[3:], below[i]):
             return RANK_LOST
-    if not _force(below, moved[:3], reached, out[TIP]):
+    if not task_torque(below, moved[:3], reached, out[TIP]):
         return RANK_LOST
     if r > 0 and not project_torque(J[3:], weighted[3:], out[TIP]):
         return RANK_LOST
     times(seen.M, posture, out[JOINT])
     return GOES_ON if project_torque(J, weighted, out[JOINT]) else RANK_LOST
-
-
-@compiled
-def _force(J: Array, moved: Array, a: Array, out: Array) -> bool:
-    """Out = J^T (J Y^T)^-1 a (n,), with Y = `moved`, each (m, n); False where J Y^T is not positive definite.
-
-    Without rows it is zero.
-    """
-    out[:] = 0.0
-    if a.size == 0:
-        return True
-    mobility, force = scratch_matrix(a.size, a.size), scratch(a.size)
-    outer_product(moved, J, mobility)
-    if not factor(mobility):
-        return False
-    force[:] = a
-    back_substitute(mobility, force)
-    transposed_times(J, force, out)
-    return True
