@@ -1,5 +1,10 @@
 # Works from any folder: `make`, `make -C path`, `make -f path/Makefile`. `make help` lists the targets.
 
+# make takes a space in a name for the end of it.
+ifneq ($(words $(MAKEFILE_LIST) $(CURDIR)),2)
+$(error The path of this folder has a space, with which make cannot work: move it, or run `pip install .` in an environment)
+endif
+
 ROOT := $(patsubst %/,%,$(dir $(abspath $(lastword $(MAKEFILE_LIST)))))
 VENV := $(ROOT)/.venv
 PY := $(VENV)/bin/python
@@ -20,10 +25,10 @@ INSTALLED_ALL := $(VENV)/.surgsim-all-$(STATE)
 PIP_INSTALL := "$(PY)" -m pip install --disable-pip-version-check --no-compile -c "$(ROOT)/constraints.txt"
 # uv installs in seconds what takes pip most of a minute. It is put beside the environment for as long as it is needed, and
 # asks the index that pip is configured for; where it cannot be had, or does not get through, pip does it all.
-UV := $(VENV)/.uv
-GET_UV := $(PIP_INSTALL) --quiet --upgrade --target '$(UV)' uv
-UV_INDEX := "$(PY)" -m pip config list 2> /dev/null | sed -nE "s/^(global|install|:env:)\.index-url='(.*)'$$/\2/p" | head -n 1
-UV_INSTALL := UV_SYSTEM_CERTS=1 "$(UV)/bin/uv" pip install --no-config --python "$(PY)" $${INDEX:+--default-index "$$INDEX"} -c "$(ROOT)/constraints.txt"
+FAST := $(VENV)/.uv
+GET_FAST := $(PIP_INSTALL) --quiet --upgrade --target '$(FAST)' uv
+INDEX_OF_PIP := "$(PY)" -m pip config list 2> /dev/null | sed -nE "s/^(global|install|:env:)\.index-url='(.*)'$$/\2/p" | head -n 1
+BY_FAST := UV_SYSTEM_CERTS=1 "$(FAST)/bin/uv" pip install --no-config --python "$(PY)" $${INDEX:+--default-index "$$INDEX"} -c "$(ROOT)/constraints.txt"
 # pip says nothing while it unpacks: every ten seconds a line tells how much is there.
 ALIVE := began=$$(date +%s); { while sleep 10 > /dev/null 2>&1; do printf '  installing for %s s, %s MB so far\n' "$$(($$(date +%s) - began))" "$$(du -sm '$(VENV)' | cut -f1)" >&2; done; } & trap "kill $$! 2> /dev/null" EXIT;
 OLD_ENOUGH := import sys; v = sys.version_info; sys.exit(0 if v >= (3, 11) else "surgsim needs Python 3.11 or newer; %s is %d.%d. Set PYTHON=/path/to/python3.11" % (sys.executable, v[0], v[1]))
@@ -83,9 +88,9 @@ define install
 	@"$(PY)" -c '$(OLD_ENOUGH)'
 	@"$(PY)" -m pip --version > /dev/null 2>&1 || "$(PY)" -m ensurepip
 	@echo 'installing surgsim into $(VENV): about 1.5 GB, some minutes' >&2
-	@{ $(GET_UV) && INDEX=$$($(UV_INDEX)) && $(UV_INSTALL) --quiet hatchling editables && $(UV_INSTALL) --no-build-isolation -e '$(1)'; } >&2 \
+	@{ $(GET_FAST) && INDEX=$$($(INDEX_OF_PIP)) && $(BY_FAST) --quiet hatchling editables && $(BY_FAST) --no-build-isolation -e '$(1)'; } >&2 \
 	|| { echo 'not by uv: pip installs, which takes longer' >&2; $(ALIVE) { $(PIP_INSTALL) --quiet hatchling editables && $(PIP_INSTALL) --no-build-isolation -e '$(1)'; } >&2; }
-	@rm -rf '$(UV)'
+	@rm -rf '$(FAST)'
 	@rm -f '$(VENV)'/.surgsim-*
 endef
 

@@ -70,3 +70,14 @@ def test_a_form_for_issues_has_what_its_format_requires(name):
     fields = [field["id"] for field in form["body"]]
     assert len(fields) == len(set(fields))
     assert all(field["attributes"]["label"] for field in form["body"])
+
+
+def test_make_says_at_once_that_it_cannot_work_in_a_folder_with_a_space(tmp_path):
+    folder = tmp_path / "my surgsim"
+    folder.mkdir()
+    (folder / "Makefile").write_text((ROOT / "Makefile").read_text("utf-8"), "utf-8")
+    done = subprocess.run(["make", "help"], cwd=folder, capture_output=True, text=True, timeout=60)
+    assert done.returncode == 2
+    assert "has a space" in done.stderr
+    assert "pip install ." in done.stderr
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["my surgsim"]

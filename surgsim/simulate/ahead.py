@@ -56,11 +56,10 @@ def kernels(joints: int) -> Iterator[Callable[[], object]]:
 @contextmanager
 def compiling_ahead(joints: int) -> Iterator[None]:
     """Compile what every run needs in a second process, which ends with the block; not on one processor."""
-    command, environment = module_program(__name__, str(joints))
-    silent = subprocess.DEVNULL
-    helper = None
+    silent, helper = subprocess.DEVNULL, None
     if cores() > 1:
         with suppress(OSError):  # then this process compiles everything
+            command, environment = module_program(__name__, str(joints))
             helper = subprocess.Popen(
                 command, env=environment, stdin=subprocess.PIPE, stdout=silent, stderr=silent
             )

@@ -72,6 +72,17 @@ def test_the_best_is_the_most_transparent_of_those_that_are_passive_and_rest_wit
     assert (none["best"], none["qualified"], none["mismatch"]) == ("none", 0, None)
 
 
+def test_the_best_presses_like_the_others_and_small_differences_count_for_nothing():
+    rows = [
+        *seeds("waves", 0.001, 0.001, 0.001, contact_force_n=0.2),
+        *seeds("P+d", 0.010, 0.011, 0.012),
+        *seeds("two-layer", 0.055, 0.055, 0.055),
+        *seeds("set-position", 0.065, 0.065, 0.065),
+    ]
+    (best,) = winners_table(map_table(rows))
+    assert (best["best"], best["qualified"], best["not_told_apart"]) == ("P+d", 4, "two-layer")
+
+
 def test_a_scheme_is_counted_where_it_is_good_and_where_nobody_is_told_from_it():
     rows = [
         *seeds("P+d", 0.10, 0.11, 0.12),
@@ -156,6 +167,24 @@ def test_the_stiffness_of_a_wall_is_that_of_coupling_and_wall_in_series(scheme):
     coupling, wall = task.bilateral.stiffness_n_per_m, 20000.0
     series = task.mapping.scale**2 * coupling * wall / (coupling + wall)
     assert render.measured().row["stiffness_n_per_m"] == pytest.approx(series, rel=0.01)
+
+
+def test_a_wall_that_is_not_touched_or_not_held_still_has_no_stiffness():
+    for scheme in ("time-domain", "position-force"):
+        found = Render(scheme=scheme, wall=True, delay_ms=300).measured().row
+        assert found["outcome"] == "completed"
+        assert found["stiffness_n_per_m"] is None
+
+
+def test_the_hand_pushes_as_deep_through_a_delay():
+    """It waits until it has seen its own move aside, so that it aims at where the tip is."""
+    near, far = (
+        Push(scheme="position-position", grip="normal", delay_ms=delay, loss=0.0).run().active()
+        for delay in (0, 1000)
+    )
+    goals = [run.block("hand_intended")[-1] for run in (near, far)]
+    scale = near.meta.scenario["task"]["mapping"]["scale"]
+    assert scale * np.linalg.norm(goals[0] - goals[1]) < 9e-3  # it was 20 mm and more
 
 
 def test_free_motion_that_is_not_felt_has_no_impedance():

@@ -17,6 +17,7 @@ from surgsim.studies.bilateral_schemes.measures import (
     best_table,
     is_good,
     map_table,
+    qualified,
     rendered_table,
     schemes_table,
     winners_table,
@@ -87,13 +88,12 @@ def _without(tables: Tables) -> Judged | None:
 
 
 def _everywhere(tables: Tables) -> Judged:
-    names = {str(row["scheme"]) for row in tables["map"]}
-    whole = [
-        name for name in SCHEMES if name in names and all(map(is_good, pick(tables["map"], scheme=name)))
-    ]
+    names = [name for name in SCHEMES if pick(tables["map"], scheme=name)]
+    rows = {name: pick(tables["map"], scheme=name) for name in names}
+    whole = [name for name in names if len(qualified(rows[name])) == len(rows[name])]
     return (
         "holds" if whole else "does not hold",
-        f"passive and at rest at every place: {', '.join(whole) or 'none'}",
+        f"passive, at rest and pressing at every place: {', '.join(whole) or 'none'}",
     )
 
 
@@ -121,7 +121,7 @@ STUDY = Study(
         Claim("surgsim", "a scheme with nothing to keep it passive fails somewhere", _without),
         Claim(
             "surgsim",
-            f"some scheme is passive and rests everywhere, from 0 to {DELAYS_MS[-1]} ms",
+            f"some scheme is passive, rests and presses everywhere, from 0 to {DELAYS_MS[-1]} ms",
             _everywhere,
         ),
     ],

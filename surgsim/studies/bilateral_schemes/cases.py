@@ -14,7 +14,7 @@ from surgsim.scenario.load import load_scenario
 from surgsim.scenario.schema import Scenario
 from surgsim.studies.measures import outcome
 from surgsim.studies.study import Paper, SimulatedCase
-from surgsim.studies.tables import Cell, Row
+from surgsim.studies.tables import Cell, Row, number
 from surgsim.teleop.judgement import PASSIVE_J, excess_j
 from surgsim.trace.trace import Trace
 
@@ -40,6 +40,9 @@ SCHEMES: dict[str, str] = {
     "time-domain": "{type: time_domain}",
 }
 """What a scheme is called here, and `task.bilateral`."""
+_AS_THE_OTHERS = ("task.bilateral.stiffness_n_per_m=240.0",)
+COUPLED = {"waves": _AS_THE_OTHERS, "time-domain": _AS_THE_OTHERS}
+"""Whose coupling is stiffer than the others' by default, 500 N/m, and made equal for the Z-width."""
 MADE_PASSIVE = (
     "passive convex, tank",
     "passive convex, tdpa",
@@ -71,7 +74,9 @@ REST_MM_PER_S, STEADY_N, STEADY_SHARE = 5.0, 0.5, 0.05
 DEPTHS_M, HOLD_S, HOLD_ROUND_TRIPS, MOVES_S = (-0.065, -0.08), 2.5, 2.0, 2.0
 """Where the hand goes to be shown an impedance, how long it holds there, and what the moves take."""
 _LIGHT = ("task.operator.stiffness_n_per_m=20.0", "task.operator.damping_ns_per_m=1.0")
-_ASIDE = "{position_m: [0.02, 0.65, -0.045], push: true, dwell_s: 0.1}"
+_ASIDE = "{{position_m: [0.02, 0.65, -0.045], push: true, dwell_s: {dwell_s}}}"
+SEEN_S = 0.5
+"""The hand waits for this beyond the round trip before it pushes: it aims by what it sees of the tip."""
 _DOWN = "{position_m: [0.0, 0.65, -0.075], push: true, dwell_s: 1000.0}"
 _LEAST_N = 0.1
 
@@ -115,6 +120,7 @@ class Push(SimulatedCase):
         """The shipped push with this scheme, these surroundings and this channel."""
         props, disturbances = SURROUNDINGS[self.surroundings]
         delay_s, jitter_s = self.delay_ms / 2000.0, self.jitter_ms / 1000.0
+        aside_s = round(SEEN_S + 2.0 * delay_s, 3)
         line = f"{{delay_s: {delay_s}, jitter_s: {jitter_s}, loss: {self.loss}}}"
         return load_scenario(
             "teleop_wall_panda",
@@ -124,7 +130,7 @@ class Push(SimulatedCase):
                 "plant.energy_ledger=false",
                 f"props={props}",
                 f"disturbances={disturbances}",
-                f"task.goals=[{_ASIDE}, {_DOWN}]",
+                f"task.goals=[{_ASIDE.format(dwell_s=aside_s)}, {_DOWN}]",
                 f"task.bilateral={SCHEMES[self.scheme]}",
                 f"task.duration_s={self.duration_s}",
                 f"task.channel={line}",
@@ -210,6 +216,7 @@ class Render(SimulatedCase):
                 f"props={props if self.wall else '[]'}",
                 f"task.goals=[{', '.join(goals)}]",
                 f"task.bilateral={SCHEMES[self.scheme]}",
+                *COUPLED.get(self.scheme, ()),
                 f"task.duration_s={round(2.0 * self.dwell_s + MOVES_S, 3)}",
                 f"task.channel={{delay_s: {self.delay_ms / 2000.0}, jitter_s: 0.0, loss: 0.0}}",
             ],
@@ -226,16 +233,19 @@ def render_measures(trace: Trace) -> Row:
 
     `damping_ns_per_m` is the power that they take from the handle over its speed's square, and
     `impedance_ns_per_m` their force over its speed, both by RMS over the run. `stiffness_n_per_m` is the
-    change of their force over that of the handle's position between the ends of both holds.
+    change of their force along the handle's way between the ends of both holds, over that way; there is none
+    unless the tip touches and everything is at rest at both.
     """
-    force, velocity, handle = (trace.block(name) for name in ("master_force", "handle_velocity", "handle"))
-    goal, t = trace["goal"], trace["t_s"]
-    ends = [
+    force, velocity, handle, tip = (
+        trace.block(name) for name in ("master_force", "handle_velocity", "handle", "tip_force")
+    )
+    goal, t, excess = trace["goal"], trace["t_s"], excess_j(trace)
+    holds = [
         (goal == k) & (t >= t[goal == k][-1] - WINDOW_S / 2.0)
         for k in range(len(DEPTHS_M))
         if (goal == k).any()
     ]
-    excess = excess_j(trace)
+    touch = [np.linalg.norm(tip[hold], axis=1) for hold in holds]
     row: dict[str, Cell] = {
         "outcome": outcome(trace),
         "passive": float(excess <= PASSIVE_J),
@@ -243,12 +253,13 @@ def render_measures(trace: Trace) -> Row:
         "damping_ns_per_m": -float((force * velocity).sum() / (velocity**2).sum()),
         "impedance_ns_per_m": rms(_size(trace, "master_force")) / rms(_size(trace, "handle_velocity")),
         "stiffness_n_per_m": None,
-        "handle_speed_mm_per_s": None,
+        "contact_force_n": float(touch[-1].mean()),
+        "handle_speed_mm_per_s": 1e3 * max(rms(np.linalg.norm(velocity[hold], axis=1)) for hold in holds),
     }
-    if len(ends) == len(DEPTHS_M):
-        change = [np.linalg.norm(a[ends[1]].mean(axis=0) - a[ends[0]].mean(axis=0)) for a in (force, handle)]
-        row["stiffness_n_per_m"] = float(change[0] / change[1])
-        row["handle_speed_mm_per_s"] = 1e3 * max(rms(_size(trace, "handle_velocity")[end]) for end in ends)
+    steady = all(n.mean() > _LEAST_N and n.std() <= max(_LEAST_N, STEADY_SHARE * n.mean()) for n in touch)
+    if len(holds) == len(DEPTHS_M) and steady and number(row, "handle_speed_mm_per_s") <= REST_MM_PER_S:
+        way, change = (a[holds[1]].mean(axis=0) - a[holds[0]].mean(axis=0) for a in (handle, force))
+        row["stiffness_n_per_m"] = -float(change @ way) / float(way @ way)
     return row
 
 

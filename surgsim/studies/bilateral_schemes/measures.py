@@ -59,8 +59,15 @@ def qualified(rows: Sequence[Row]) -> list[Row]:
     return sorted(good, key=lambda row: number(row, "mismatch"))
 
 
+MATTERS, PRESS_SHARE = 0.05, 0.5
+"""A smaller difference of mismatch counts for nothing; who is best presses at least so much of the median."""
+
+
 def winners_table(table: Sequence[Row]) -> list[Row]:
-    """Who is best at each place: the smallest mismatch of those that qualify, and who is not told from it."""
+    """Who is best at each place: the smallest mismatch of those that qualify and press like most of them.
+
+    Not told from it is whose interval reaches into its own, or whose mismatch is less than `MATTERS` larger.
+    """
     found: list[Row] = []
     for place, rows in groups(table, *PLACE).items():
         good = qualified(rows)
@@ -71,13 +78,17 @@ def winners_table(table: Sequence[Row]) -> list[Row]:
         }
         row |= {"mismatch": None, "mismatch_low": None, "mismatch_high": None, "not_told_apart": ""}
         if good:
-            best, others = good[0], good[1:]
+            enough = PRESS_SHARE * float(np.median(numbers(good, "contact_force_n")))
+            best, *others = [each for each in good if number(each, "contact_force_n") >= enough]
             near = [
-                other for other in others if number(other, "mismatch_low") <= number(best, "mismatch_high")
+                each
+                for each in others
+                if number(each, "mismatch_low") <= number(best, "mismatch_high")
+                or number(each, "mismatch") < number(best, "mismatch") + MATTERS
             ]
             row["best"] = best["scheme"]
             row |= {key: best[key] for key in ("mismatch", "mismatch_low", "mismatch_high")}
-            row["not_told_apart"] = ", ".join(str(other["scheme"]) for other in near)
+            row["not_told_apart"] = ", ".join(str(each["scheme"]) for each in near)
         found.append(row)
     return found
 

@@ -116,21 +116,22 @@ every place."""
 _SCHEMES = """## How often each scheme is good
 
 A place is what is pushed on, by which grip, through what round trip, loss and jitter. The hand moves aside,
-then to 15 mm below the surface, and holds for 6 s and 4 round trips. A light grip is 20 N/m and 1 N s/m, a
-normal one 135 N/m and 6.45 N s/m. Jitter is the standard deviation of the delay each way, which is never
-shorter than half the round trip; packets may overtake each other.
+waits until it must have seen that, moves to 15 mm below the surface, and holds: 6 s and 4 round trips in all.
+A light grip is 20 N/m and 1 N s/m, a normal one 135 N/m and 6.45 N s/m. Jitter is the standard deviation of
+the delay each way, which is never shorter than half the round trip; packets may overtake each other.
 
 A scheme is passive where it never gives more than 1 mJ beyond what it had stored. It rests where the handle
 ends below 5 mm/s (RMS) and the contact's force is steady. It qualifies where it does both with every one of
 three seeds, and presses with more than 0.1 N."""
 _BEST = """## Which scheme is best where
 
-Best is the one with the smallest `mismatch` of those that qualify: how far the force on the hand, in the
-scale of the tip, is from that on the tip, over the latter. `+2` says that two others are not told from it:
-their 95 % intervals reach into its own. `winners.csv` has names and intervals.
+Best is the one with the smallest `mismatch` of those that qualify and press with at least half the median
+force: how far the force on the hand, in the scale of the tip, is from that on the tip, over the latter. `+2`
+says that two others are not told from it: their 95 % intervals reach into its own, or their mismatch is less
+than 0.05 larger. `winners.csv` has names and intervals.
 
-A scheme that is called best is so by this measure alone: the passive convex control presses far harder than
-its hand feels, since it has no force between hand and tip, and is never best by it."""
+A scheme that is called best is so by this measure alone, at rest. The passive convex control presses far
+harder than its hand feels, since it has no force between hand and tip, and is never best by it."""
 _MAPS = """## Where it is passive and at rest
 
 By the worst of the seeds. Without loss and jitter a seed draws tremor and scatter of the hand alone."""
@@ -144,9 +145,10 @@ The range of impedances that a scheme renders passively (Colgate, Brown, IEEE IC
 hand feels in free motion, which should be nothing, to what it feels of a wall, which should be stiff. The
 hand goes to 5 mm and then to 20 mm below a surface, in a normal grip through a clean line, and holds at both.
 First the impedance in free motion: force of the console's motors over the handle's speed, by RMS, in N s/m.
-Then the stiffness of the wall: the change of that force over the handle's way between both holds, in N/m.
-`!`: not passive with every seed. A stiffness of 60 N/m is that of the coupling, 240 N/m at the tip, in the
-scale of the handle; the wall itself would be 5,000 N/m there. `z_width.csv` has all figures."""
+Then the stiffness of the wall: the change of that force over the handle's way between both holds, in N/m; `-`
+where the tip does not touch, or not everything rests, at both. `!`: not passive with every seed, in this
+motion and by this hand. Every coupling has 240 N/m at the tip here, 60 N/m in the scale of the handle; the
+wall itself would be 5,000 N/m there. `z_width.csv` has all figures."""
 
 SECTIONS = (
     Section(_SCHEMES, "schemes"),
