@@ -236,16 +236,15 @@ def render_measures(trace: Trace) -> Row:
     change of their force along the handle's way between the ends of both holds, over that way; there is none
     unless the tip touches and everything is at rest at both.
     """
-    force, velocity, handle, tip = (
-        trace.block(name) for name in ("master_force", "handle_velocity", "handle", "tip_force")
-    )
+    force, velocity, handle = (trace.block(name) for name in ("master_force", "handle_velocity", "handle"))
     goal, t, excess = trace["goal"], trace["t_s"], excess_j(trace)
     holds = [
         (goal == k) & (t >= t[goal == k][-1] - WINDOW_S / 2.0)
         for k in range(len(DEPTHS_M))
         if (goal == k).any()
     ]
-    touch = [np.linalg.norm(tip[hold], axis=1) for hold in holds]
+    touched = _size(trace, "tip_force") if "tip_force" in trace else np.zeros(len(trace))
+    touch = [touched[hold] for hold in holds]
     row: dict[str, Cell] = {
         "outcome": outcome(trace),
         "passive": float(excess <= PASSIVE_J),
