@@ -119,7 +119,11 @@ def _die_with_parent() -> None:
 
 def leave_in_peace() -> None:
     """In a worker process that is about to end: SIGTERM no longer disturbs its way out."""
-    signal.signal(signal.SIGTERM, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, _pass_over)
+
+
+def _pass_over(number: int, _: FrameType | None) -> None:
+    """Do nothing. Python complains of one that is ignored by SIG_IGN if it came a moment before."""
 
 
 class _Leaving(SystemExit):
@@ -139,7 +143,7 @@ def _leave_at_a_signal() -> None:
 
 
 def _leave(number: int, _: FrameType | None) -> None:
-    signal.signal(number, signal.SIG_IGN)
+    signal.signal(number, _pass_over)
     raise _Leaving(number)
 
 

@@ -241,3 +241,18 @@ def test_a_signal_that_comes_while_an_object_is_finalised_is_not_lost(process):
     done = subprocess.run(words, capture_output=True, text=True, timeout=60, check=False)
     assert (done.returncode, done.stderr) == (128 + signal.SIGTERM, "")
     assert time.monotonic() - began < 15.0
+
+
+def test_a_worker_that_leaves_is_not_disturbed_however_late_the_signal_comes():
+    """A signal that was set off just before it is ignored makes Python print an OSError; here it does nothing."""
+    code = (
+        "import os, signal\n"
+        "from surgsim.runs import stop\n"
+        "stop._leave_at_a_signal()\n"
+        "stop.leave_in_peace()\n"
+        "assert callable(signal.getsignal(signal.SIGTERM))\n"
+        "for _ in range(100):\n    os.kill(os.getpid(), signal.SIGTERM)\n"
+        "print('left')\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60)
+    assert (done.returncode, done.stdout, done.stderr) == (0, "left\n", "")
