@@ -244,7 +244,7 @@ def test_a_signal_that_comes_while_an_object_is_finalised_is_not_lost(process):
 
 
 def test_a_worker_that_leaves_is_not_disturbed_however_late_the_signal_comes():
-    """A signal that was set off just before it is ignored makes Python print an OSError; here it does nothing."""
+    """Python complains of a signal that came just before it was to be ignored; here it does nothing."""
     code = (
         "import os, signal\n"
         "from surgsim.runs import stop\n"
