@@ -29,7 +29,7 @@ FAST := $(VENV)/.uv
 GET_FAST := $(PIP_INSTALL) --quiet --upgrade --target '$(FAST)' uv
 INDEX_OF_PIP := "$(PY)" -m pip config list 2> /dev/null | sed -nE "s/^(global|install|:env:)\.index-url='(.*)'$$/\2/p" | head -n 1
 BY_FAST := UV_SYSTEM_CERTS=1 "$(FAST)/bin/uv" pip install --no-config --python "$(PY)" $${INDEX:+--default-index "$$INDEX"} -c "$(ROOT)/constraints.txt"
-# pip says nothing while it unpacks: every ten seconds a line tells how much is there.
+# Both say nothing while they unpack, uv outside a terminal not while it downloads: every ten seconds a line tells how much is there.
 ALIVE := began=$$(date +%s); { while sleep 10 > /dev/null 2>&1; do printf '  installing for %s s, %s MB so far\n' "$$(($$(date +%s) - began))" "$$(du -sm '$(VENV)' | cut -f1)" >&2; done; } & trap "kill $$! 2> /dev/null" EXIT;
 OLD_ENOUGH := import sys; v = sys.version_info; sys.exit(0 if v >= (3, 11) else "surgsim needs Python 3.11 or newer; %s is %d.%d. Set PYTHON=/path/to/python3.11" % (sys.executable, v[0], v[1]))
 
@@ -87,9 +87,9 @@ clean:  ## remove build products and caches; .venv and runs stay
 define install
 	@"$(PY)" -c '$(OLD_ENOUGH)'
 	@"$(PY)" -m pip --version > /dev/null 2>&1 || "$(PY)" -m ensurepip
-	@echo 'installing surgsim into $(VENV): about 1.5 GB, some minutes' >&2
-	@{ $(GET_FAST) && INDEX=$$($(INDEX_OF_PIP)) && $(BY_FAST) --quiet hatchling editables && $(BY_FAST) --no-build-isolation -e '$(1)'; } >&2 \
-	|| { echo 'not by uv: pip installs, which takes longer' >&2; $(ALIVE) { $(PIP_INSTALL) --quiet hatchling editables && $(PIP_INSTALL) --no-build-isolation -e '$(1)'; } >&2; }
+	@echo 'installing surgsim into $(VENV): about 1.5 GB' >&2
+	@exec >&2; $(ALIVE) { $(GET_FAST) && INDEX=$$($(INDEX_OF_PIP)) && $(BY_FAST) --quiet hatchling editables && $(BY_FAST) --no-build-isolation -e '$(1)'; } \
+	|| { echo 'not by uv: pip installs, which takes longer'; $(PIP_INSTALL) --quiet hatchling editables && $(PIP_INSTALL) --no-build-isolation -e '$(1)'; }
 	@rm -rf '$(FAST)'
 	@rm -f '$(VENV)'/.surgsim-*
 endef

@@ -10,7 +10,7 @@ import os
 import subprocess
 import sys
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from typing import Any
 
@@ -35,22 +35,22 @@ from surgsim.simulate.ticks import (
 from surgsim.tick.arrays import A1, A2, Model, type_of
 
 
-def kernels(joints: int) -> Iterator[Callable[[], object]]:
-    """What compiles each kernel that no part changes, for an arm of so many joints."""
-    yield lambda: as_parameter(run_ticks, run_signature(joints))
-    yield lambda: as_parameter(decide, decide_signature(joints))
-    yield lambda: as_parameter(derive, derive_signature(joints))
-    yield lambda: as_parameter(hold_ticks, hold_signature(joints))
-    yield lambda: as_parameter(ask_task, ask_signature(joints))
+def compile_kernels(joints: int) -> None:
+    """Compile each kernel that no part changes, for an arm of so many joints."""
+    as_parameter(run_ticks, run_signature(joints))
+    as_parameter(decide, decide_signature(joints))
+    as_parameter(derive, derive_signature(joints))
+    as_parameter(hold_ticks, hold_signature(joints))
+    as_parameter(ask_task, ask_signature(joints))
     model, number = type_of(Model, joints), types.float64
     place, q = np.zeros(3), np.zeros(joints)
     typed: Any = numba.typeof
     on = typed(Manifold(rows=0, p_WT=place, p_WC=place, low=q, high=q))
-    yield lambda: compile_for(project, model, on, A1, types.int64)
-    yield lambda: compile_for(manipulability, A2)
-    yield lambda: compile_for(climb, model, on, A1, types.int64, number)
-    yield lambda: compile_for(is_inside, on, A1, number)
-    yield lambda: compile_for(climb_from, model, on, A1, number, A1, A1)
+    compile_for(project, model, on, A1, types.int64)
+    compile_for(manipulability, A2)
+    compile_for(climb, model, on, A1, types.int64, number)
+    compile_for(is_inside, on, A1, number)
+    compile_for(climb_from, model, on, A1, number, A1, A1)
 
 
 @contextmanager
@@ -80,8 +80,7 @@ def _end_with_parent() -> None:
 def main() -> None:
     """Compile everything, or until the process that asked for it ends."""
     threading.Thread(target=_end_with_parent, daemon=True).start()
-    for compile_kernel in kernels(int(sys.argv[1])):
-        compile_kernel()
+    compile_kernels(int(sys.argv[1]))
 
 
 if __name__ == "__main__":

@@ -42,8 +42,7 @@ def test_what_is_compiled_ahead_is_what_a_run_asks_for():
     compute_metrics(simulate(load_scenario("circle_lwr4plus", assignments=["task.duration_s=3"])))
     asked = forms()
     assert all(overloads or signatures for overloads, signatures in asked.values())
-    for compile_kernel in ahead.kernels(7):
-        compile_kernel()
+    ahead.compile_kernels(7)
     assert forms() == asked
 
 

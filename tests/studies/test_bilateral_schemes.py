@@ -92,7 +92,7 @@ def test_a_scheme_is_counted_where_it_is_good_and_where_nobody_is_told_from_it()
         *seeds("P+d", 0.1, 0.1, None, delay_ms=300, jitter_ms=20),
     ]
     table = map_table(rows)
-    held, waves = schemes_table(table)
+    held, waves = schemes_table(table, winners_table(table))
     assert held == {
         "scheme": "P+d",
         "places": 3,
@@ -222,7 +222,7 @@ def test_the_committed_page_is_that_of_the_committed_pushes(read_numbers):
         assert f"| {claim.text} | {claim.source} | **{claim.verdict}** |" in page
     again = winners_table(map_table(committed["pushes"]))
     assert [line["best"] for line in again] == [line["best"] for line in committed["winners"]]
-    counted = schemes_table(map_table(committed["pushes"]))
+    counted = schemes_table(map_table(committed["pushes"]), again)
     assert [line["qualified"] for line in counted] == [line["qualified"] for line in committed["schemes"]]
     assert sorted(path.name for path in RESULTS.glob("*.png")) == [
         "stability.png",

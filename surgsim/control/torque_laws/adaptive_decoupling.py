@@ -17,11 +17,9 @@ from surgsim.control.torque_laws.rcm_hierarchy import (
     K_JOINT,
     K_RCM,
     K_TIP,
-    Pair,
     fill_task_errors,
-    hierarchy_gains,
 )
-from surgsim.control.torque_laws.rcm_tasks import OWN_GAINS, RcmTasksConfig
+from surgsim.control.torque_laws.rcm_tasks import OWN_GAINS, RcmTasksConfig, fill_bias
 from surgsim.models.arm import ArmModel
 from surgsim.tick.algebra import back_substitute, factor
 from surgsim.tick.arrays import Seen
@@ -60,19 +58,10 @@ class AdaptiveDecouplingConfig(RcmTasksConfig):
 
     def build(self, arm: ArmModel) -> KernelTorqueLaw:
         """The law; memory: weights, joint by joint (n * nodes,), and the inertia of each joint (n,)."""
-        n, most = arm.limits.torque.size, (self.drive_share * arm.locked_frequency) ** 2
-
-        def pair(stiffness: float, ratio: float, bounded: float) -> Pair:
-            return (stiffness, ratio) if stiffness <= most else (most, bounded)
-
-        bounded = self.drive_damping_ratio
+        n, fastest = arm.limits.torque.size, self.drive_share * arm.locked_frequency
         gains = [
-            *hierarchy_gains(
-                pair(self.rcm_stiffness_per_s2, self.rcm_damping_ratio, bounded),
-                pair(self.tip_stiffness_per_s2, self.tip_damping_ratio, bounded),
-                pair(self.joint_stiffness_per_s2, self.joint_damping_ratio, self.joint_damping_ratio),
-            ),
-            min(self.adaptation_per_s2, most),
+            *self.bounded_gains(fastest, self.drive_damping_ratio),
+            min(self.adaptation_per_s2, fastest**2),
             self.leakage_per_s,
             self.nodes,
             self.slowest_rad_per_s,
@@ -125,7 +114,7 @@ def adaptive_decoupling(gains: Array, seen: Seen, memory: Array, out: Array) -> 
     for i in range(n):
         turning = seen.v[i] - seen.qdot_ref[i]
         posture[i] = -gains[K_JOINT] * (seen.q[i] - seen.q_ref[i]) - gains[D_JOINT] * turning
-        out[BIAS, i] = seen.bias[i] + seen.damping[i] * seen.v[i]
+    fill_bias(seen, out[BIAS])
     if not decouple(seen.M, J[:3], a[:3], J[3:], a[3:], posture, out[:3]):
         return RANK_LOST
     _learn(gains, seen, sliding, memory, out[LEARNT])

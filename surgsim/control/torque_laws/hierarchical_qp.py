@@ -15,7 +15,7 @@ from surgsim.control.observer import delay_size, observer_size, remember_command
 from surgsim.control.planes import PlaneConfig, plane_numbers
 from surgsim.control.task_programs import solve_tasks
 from surgsim.control.torque_laws.base import KernelTorqueLaw
-from surgsim.control.torque_laws.rcm_hierarchy import HIERARCHY_GAINS, Pair, fill_demand, hierarchy_gains
+from surgsim.control.torque_laws.rcm_hierarchy import HIERARCHY_GAINS, fill_demand
 from surgsim.control.torque_laws.rcm_inverse_dynamics import foresee, whole_share
 from surgsim.control.torque_laws.rcm_tasks import RcmTasksConfig
 from surgsim.models.arm import ArmModel
@@ -90,7 +90,7 @@ class HierarchicalQpConfig(RcmTasksConfig):
         motors = np.zeros(n) if arm.drive is None else arm.drive.apparent_inertia
         gains = np.concatenate(
             [
-                self._hierarchy(self.drive_share * arm.locked_frequency),
+                self.bounded_gains(self.drive_share * arm.locked_frequency, self.drive_damping_ratio),
                 (kind, self.torque_rate_nm_per_s or rate, radius, *self.barrier_poles_per_s),
                 weights if self.mode == "weighted" else (0.0, 0.0, 0.0),
                 (self.observer_gain, self.most_delay_ticks, self.full_gain_delay_s, *motors),
@@ -107,19 +107,6 @@ class HierarchicalQpConfig(RcmTasksConfig):
             gains=gains,
             memory_size=n + kept + limits + 5,
             failures={INFEASIBLE: "the programs of the hierarchy have no answer"},
-        )
-
-    def _hierarchy(self, most: float) -> list[float]:
-        """Gains of RCM, tip and posture, for bandwidths of at most `most` [rad/s]."""
-
-        def pair(stiffness: float, ratio: float, bounded_ratio: float) -> Pair:
-            return (most * most, bounded_ratio) if stiffness > most * most else (stiffness, ratio)
-
-        bounded = self.drive_damping_ratio
-        return hierarchy_gains(
-            pair(self.rcm_stiffness_per_s2, self.rcm_damping_ratio, bounded),
-            pair(self.tip_stiffness_per_s2, self.tip_damping_ratio, bounded),
-            pair(self.joint_stiffness_per_s2, self.joint_damping_ratio, self.joint_damping_ratio),
         )
 
 

@@ -44,7 +44,11 @@ class JointReferenceConfig(PartConfig):
         if own is not None and self.feedforward == "damping":
             gains[:n], gains[n:] = own.stiffness, 2.0 * own.damping_ratio
         return KernelTorqueLaw(
-            kernel=joint_reference, arm=arm, terms=("feedforward",), gains=gains, commands_reference=True
+            kernel=joint_reference,
+            arm=arm,
+            terms=("feedforward",),
+            gains=gains,
+            commands_reference=self.commands_reference,
         )
 
 

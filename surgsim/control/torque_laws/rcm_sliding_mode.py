@@ -11,6 +11,7 @@ from surgsim.compiled import compiled
 from surgsim.control.torque_laws.base import KernelTorqueLaw
 from surgsim.control.torque_laws.decoupled import decouple
 from surgsim.control.torque_laws.rcm_hierarchy import fill_task_errors
+from surgsim.control.torque_laws.rcm_tasks import fill_bias
 from surgsim.models.arm import ArmModel
 from surgsim.tick.arrays import Seen
 from surgsim.tick.nominal import copy_model
@@ -120,7 +121,7 @@ def rcm_sliding_mode(gains: Array, seen: Seen, memory: Array, out: Array) -> int
         turning = seen.v[i] - seen.qdot_ref[i]
         s = turning + own[0] * (seen.q[i] - seen.q_ref[i])
         posture[i] = -own[0] * turning - own[1] * saturated(s / own[2])
-        out[BIAS, i] = seen.bias[i] + seen.damping[i] * seen.v[i]
+    fill_bias(seen, out[BIAS])
     return GOES_ON if decouple(seen.M, J[3:], a[3:], J[:3], a[:3], posture, out[:3]) else RANK_LOST
 
 

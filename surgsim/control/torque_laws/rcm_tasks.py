@@ -5,7 +5,7 @@ from pydantic import NonNegativeFloat, PositiveFloat
 from surgsim.array import Array
 from surgsim.catalog import PartConfig
 from surgsim.compiled import compiled
-from surgsim.control.torque_laws.rcm_hierarchy import HIERARCHY_GAINS, fill_demand, hierarchy_gains
+from surgsim.control.torque_laws.rcm_hierarchy import HIERARCHY_GAINS, Pair, fill_demand, hierarchy_gains
 from surgsim.tick.arrays import Seen
 from surgsim.tick.nominal import copy_model
 
@@ -41,6 +41,19 @@ class RcmTasksConfig(PartConfig):
             *further,
         )
 
+    def bounded_gains(self, most_rad_per_s: float, damping_ratio: float) -> list[float]:
+        """The same for bandwidths of at most `most_rad_per_s`; there RCM and tip have `damping_ratio`."""
+        most = most_rad_per_s * most_rad_per_s
+
+        def pair(stiffness: float, ratio: float, bounded: float) -> Pair:
+            return (most, bounded) if stiffness > most else (stiffness, ratio)
+
+        return hierarchy_gains(
+            pair(self.rcm_stiffness_per_s2, self.rcm_damping_ratio, damping_ratio),
+            pair(self.tip_stiffness_per_s2, self.tip_damping_ratio, damping_ratio),
+            pair(self.joint_stiffness_per_s2, self.joint_damping_ratio, self.joint_damping_ratio),
+        )
+
 
 @compiled
 def wanted(gains: Array, seen: Seen, J: Array, a: Array, posture: Array, h: Array) -> None:
@@ -63,5 +76,11 @@ def wanted(gains: Array, seen: Seen, J: Array, a: Array, posture: Array, h: Arra
     model = seen.elsewhere
     copy_model(seen, model)
     fill_demand(gains, seen, model, 0.0, 1.0, J, a, posture)
+    fill_bias(seen, h)
+
+
+@compiled
+def fill_bias(seen: Seen, h: Array) -> None:
+    """Fill the torque that no acceleration needs (n,) [N m]: bias of the nominal model, and joint damping."""
     for i in range(h.size):
         h[i] = seen.bias[i] + seen.damping[i] * seen.v[i]

@@ -15,6 +15,7 @@ from surgsim.studies.bilateral_schemes.cases import (
 )
 from surgsim.studies.bilateral_schemes.measures import (
     best_table,
+    is_at_rest,
     is_good,
     map_table,
     qualified,
@@ -24,7 +25,7 @@ from surgsim.studies.bilateral_schemes.measures import (
     worst_excess,
     z_width_table,
 )
-from surgsim.studies.study import Claim, Groups, Judged, Study, holds
+from surgsim.studies.study import Claim, Groups, Judged, Results, Study, holds
 from surgsim.studies.tables import Row, Tables, groups, pick
 from surgsim.teleop.judgement import PASSIVE_J
 
@@ -50,7 +51,7 @@ def _listed(excesses: dict[str, float]) -> str:
 def _ours(tables: Tables) -> Judged:
     found = worst_excess(tables["map"], SCHEME_OURS)
     rows = pick(tables["map"], scheme=SCHEME_OURS)
-    moving = [row for row in rows if row["rests"] != row["seeds"]]
+    moving = [row for row in rows if not is_at_rest(row)]
     return holds(found <= _PASSIVE_MJ), (
         f"at most {found:.3g} mJ beyond its stock in {count(len(rows), 'place')}; "
         f"not at rest in {len(moving)}{_where(moving)}"
@@ -97,6 +98,18 @@ def _everywhere(tables: Tables) -> Judged:
     )
 
 
+def _map(results: Results) -> list[Row]:
+    return map_table(results.rows("pushes"))
+
+
+def _winners(results: Results) -> list[Row]:
+    return winners_table(_map(results))
+
+
+def _z_width(results: Results) -> list[Row]:
+    return z_width_table(results.rows("renders"))
+
+
 SCHEME_OURS = "passive convex, tank"
 STUDY = Study(
     name="bilateral_schemes",
@@ -107,13 +120,13 @@ STUDY = Study(
     cases=cases_of,
     tables={
         "pushes": lambda results: results.rows("pushes"),
-        "map": lambda results: map_table(results.rows("pushes")),
-        "winners": lambda results: winners_table(map_table(results.rows("pushes"))),
-        "schemes": lambda results: schemes_table(map_table(results.rows("pushes"))),
+        "map": _map,
+        "winners": _winners,
+        "schemes": lambda results: schemes_table(_map(results), _winners(results)),
         "renders": lambda results: results.rows("renders"),
-        "z_width": lambda results: z_width_table(results.rows("renders")),
-        "rendered": lambda results: rendered_table(z_width_table(results.rows("renders"))),
-        "best": lambda results: best_table(winners_table(map_table(results.rows("pushes")))),
+        "z_width": _z_width,
+        "rendered": lambda results: rendered_table(_z_width(results)),
+        "best": lambda results: best_table(_winners(results)),
     },
     claims=[
         Claim("surgsim", "ours, with tanks and valve, gives no energy beyond its stock anywhere", _ours),

@@ -119,23 +119,14 @@ class Push(SimulatedCase):
     def scenario(self) -> Scenario:
         """The shipped push with this scheme, these surroundings and this channel."""
         props, disturbances = SURROUNDINGS[self.surroundings]
-        delay_s, jitter_s = self.delay_ms / 2000.0, self.jitter_ms / 1000.0
-        aside_s = round(SEEN_S + 2.0 * delay_s, 3)
-        line = f"{{delay_s: {delay_s}, jitter_s: {jitter_s}, loss: {self.loss}}}"
-        return load_scenario(
-            "teleop_wall_panda",
-            seed=self.seed,
-            assignments=[
-                "theatre=false",
-                "plant.energy_ledger=false",
-                f"props={props}",
-                f"disturbances={disturbances}",
-                f"task.goals=[{_ASIDE.format(dwell_s=aside_s)}, {_DOWN}]",
-                f"task.bilateral={SCHEMES[self.scheme]}",
-                f"task.duration_s={self.duration_s}",
-                f"task.channel={line}",
-                *(_LIGHT if self.grip == "light" else ()),
-            ],
+        aside = _ASIDE.format(dwell_s=round(SEEN_S + self.delay_ms / 1000.0, 3))
+        return _teleoperated(
+            self,
+            f"props={props}",
+            f"disturbances={disturbances}",
+            f"task.goals=[{aside}, {_DOWN}]",
+            f"task.channel={_line(self.delay_ms, self.jitter_ms, self.loss)}",
+            *(_LIGHT if self.grip == "light" else ()),
         )
 
     def measures(self, trace: Trace) -> Row:
@@ -203,23 +194,21 @@ class Render(SimulatedCase):
         """How long it holds at either depth [s]."""
         return round(HOLD_S + HOLD_ROUND_TRIPS * self.delay_ms / 1000.0, 3)
 
+    @property
+    def duration_s(self) -> float:
+        """Length of the run [s]."""
+        return round(2.0 * self.dwell_s + MOVES_S, 3)
+
     def scenario(self) -> Scenario:
         """The shipped push in a normal grip, through a clean line."""
         goals = [f"{{position_m: [0.0, 0.65, {z}], push: true, dwell_s: {self.dwell_s}}}" for z in DEPTHS_M]
         props, _ = SURROUNDINGS["wall"]
-        return load_scenario(
-            "teleop_wall_panda",
-            seed=self.seed,
-            assignments=[
-                "theatre=false",
-                "plant.energy_ledger=false",
-                f"props={props if self.wall else '[]'}",
-                f"task.goals=[{', '.join(goals)}]",
-                f"task.bilateral={SCHEMES[self.scheme]}",
-                *COUPLED.get(self.scheme, ()),
-                f"task.duration_s={round(2.0 * self.dwell_s + MOVES_S, 3)}",
-                f"task.channel={{delay_s: {self.delay_ms / 2000.0}, jitter_s: 0.0, loss: 0.0}}",
-            ],
+        return _teleoperated(
+            self,
+            f"props={props if self.wall else '[]'}",
+            f"task.goals=[{', '.join(goals)}]",
+            f"task.channel={_line(self.delay_ms)}",
+            *COUPLED.get(self.scheme, ()),
         )
 
     def measures(self, trace: Trace) -> Row:
@@ -260,6 +249,18 @@ def render_measures(trace: Trace) -> Row:
         way, change = (a[holds[1]].mean(axis=0) - a[holds[0]].mean(axis=0) for a in (handle, force))
         row["stiffness_n_per_m"] = -float(change @ way) / float(way @ way)
     return row
+
+
+def _teleoperated(case: "Push | Render", *assignments: str) -> Scenario:
+    """The shipped wall with the scheme, seed and length of a case, and these changes."""
+    own = (f"task.bilateral={SCHEMES[case.scheme]}", f"task.duration_s={case.duration_s}")
+    fixed = ("theatre=false", "plant.energy_ledger=false")
+    return load_scenario("teleop_wall_panda", seed=case.seed, assignments=(*fixed, *own, *assignments))
+
+
+def _line(delay_ms: int, jitter_ms: int = 0, loss: float = 0.0) -> str:
+    """The channel of a round trip, the same each way."""
+    return f"{{delay_s: {delay_ms / 2000.0}, jitter_s: {jitter_ms / 1000.0}, loss: {loss}}}"
 
 
 def _size(trace: Trace, block: str) -> Array:

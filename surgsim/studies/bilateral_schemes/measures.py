@@ -48,9 +48,19 @@ def map_table(pushes: Sequence[Row]) -> list[Row]:
     return table
 
 
+def is_passive(row: Row) -> bool:
+    """Whether a scheme is passive at a place with every seed."""
+    return row["passive"] == row["seeds"]
+
+
+def is_at_rest(row: Row) -> bool:
+    """Whether it rests there with every seed."""
+    return row["rests"] == row["seeds"]
+
+
 def is_good(row: Row) -> bool:
-    """Whether a scheme is passive and rests at a place, with every seed."""
-    return row["passive"] == row["rests"] == row["seeds"]
+    """Whether it does both."""
+    return is_passive(row) and is_at_rest(row)
 
 
 def qualified(rows: Sequence[Row]) -> list[Row]:
@@ -106,9 +116,8 @@ def best_table(winners: Sequence[Row]) -> list[Row]:
     return found
 
 
-def schemes_table(table: Sequence[Row]) -> list[Row]:
+def schemes_table(table: Sequence[Row], winners: Sequence[Row]) -> list[Row]:
     """In how many places each scheme is passive, rests, qualifies and is best, and its worst excess."""
-    winners = winners_table(table)
     found: list[Row] = []
     for (scheme,), rows in groups(table, "scheme").items():
         first = pick(winners, best=scheme)
@@ -117,8 +126,8 @@ def schemes_table(table: Sequence[Row]) -> list[Row]:
             {
                 "scheme": scheme,
                 "places": len(rows),
-                "passive": sum(row["passive"] == row["seeds"] for row in rows),
-                "rests": sum(row["rests"] == row["seeds"] for row in rows),
+                "passive": sum(map(is_passive, rows)),
+                "rests": sum(map(is_at_rest, rows)),
                 "qualified": len(qualified(rows)),
                 "best": len(first),
                 "best_or_not_told_apart": len(first) + len(near),
@@ -158,7 +167,7 @@ def rendered_table(z_widths: Sequence[Row]) -> list[Row]:
         for place in rows:
             stiffness = place["wall_stiffness_n_per_m"]
             wall = "-" if stiffness is None else f"{stiffness:.3g}"
-            mark = "" if place["passive"] == place["seeds"] else " !"
+            mark = "" if is_passive(place) else " !"
             row[f"{number(place, 'delay_ms'):g} ms"] = (
                 f"{number(place, 'free_impedance_ns_per_m'):.2g}, {wall}{mark}"
             )

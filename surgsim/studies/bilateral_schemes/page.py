@@ -4,7 +4,7 @@ from itertools import product
 from typing import Any
 
 from surgsim.studies.bilateral_schemes.cases import DELAYS_MS, GRIPS, NETWORKS, SCHEMES, SURROUNDINGS
-from surgsim.studies.bilateral_schemes.measures import qualified
+from surgsim.studies.bilateral_schemes.measures import is_at_rest, is_passive, qualified
 from surgsim.studies.figure import BLACK, BLUE, GREEN, ORANGE, PURPLE, VERMILLION, Axes, label
 from surgsim.studies.study import Figure, Results, Section
 from surgsim.studies.tables import Row, Tables, number, pick
@@ -21,7 +21,7 @@ _LINES = (BLACK, BLUE, GREEN, ORANGE, PURPLE, VERMILLION)
 
 def _kind(row: Row) -> str:
     """What a place of the map is, by its worst seed."""
-    passive, rests = row["passive"] == row["seeds"], row["rests"] == row["seeds"]
+    passive, rests = is_passive(row), is_at_rest(row)
     return "both" if passive and rests else "passive" if passive else "rests" if rests else "neither"
 
 
@@ -81,8 +81,11 @@ def _transparency(axes: Axes, _: Results, tables: Tables) -> None:
 def _z_width(axes: Axes, _: Results, tables: Tables) -> None:
     """What the hand feels of free motion and of the wall, over the delay, where a scheme is passive."""
     for n, scheme in enumerate(SCHEMES):
-        rows = [row for row in pick(tables["z_width"], scheme=scheme) if row["passive"] == row["seeds"]]
-        rows = [row for row in rows if row["wall_stiffness_n_per_m"] is not None]
+        rows = [
+            row
+            for row in pick(tables["z_width"], scheme=scheme)
+            if is_passive(row) and row["wall_stiffness_n_per_m"] is not None
+        ]
         style = {"color": _LINES[n % len(_LINES)], "linestyle": "-" if n < len(_LINES) else "--"}
         x = [number(row, "delay_ms") for row in rows]
         for ax, column in zip(axes[0], ("free_impedance_ns_per_m", "wall_stiffness_n_per_m"), strict=True):
