@@ -6,7 +6,7 @@ A command is where the joints are to be at the end of a control period. The refe
     v_k = (q_d,k - q_d,k-1) / h,  a_k = (v_k - v_k-1) / h,  j_k = (a_k - a_k-1) / h
 
 with the control period h. Of a command that does not arrive the interface assumes constant acceleration,
-a_k = a_k-1, as Franka's does. The loop is
+a_k = a_k-1. The loop is
 
     u = K_j (q_d - q) - D_j theta' + tau_ff + c(q, q')
     q = theta - tau_J / K,    D_j = 2 zeta sqrt(K_j M_jj(q))
@@ -15,10 +15,10 @@ inside the torque limits, with inertia M and bias c of the arm's own model, eval
 Position and speed are the motor's, the position less the deflection of the gear K by the measured torque
 tau_J: damping of the link's speed through the gear would make a stiff loop unstable.
 
-Source: `doJntImpedanceControl` of KUKA's Fast Research Interface for what is commanded, with the damping as a
-ratio; the maker does not say of which inertia. For the motor's side: Albu-Schaeffer, Ott, Hirzinger, Int. J.
-Robotics Research 26:23 (2007). For limits and lost commands: Franka's FCI documentation, "Robot and
-interface specifications" and "libfranka: Under the hood".
+Source: the Fast Research Interface's `doJntImpedanceControl` for what is commanded, with the damping as a
+ratio; its maker does not say of which inertia. For the motor's side: Albu-Schaeffer, Ott, Hirzinger, Int. J.
+Robotics Research 26:23 (2007). For limits and lost commands: the documentation of FCI, "Robot and interface
+specifications" and "libfranka: Under the hood".
 """
 
 import math
