@@ -33,6 +33,9 @@ BY_FAST := UV_SYSTEM_CERTS=1 "$(FAST)/bin/uv" pip install --no-config --python "
 ALIVE := began=$$(date +%s); { while sleep 10 > /dev/null 2>&1; do printf '  installing for %s s, %s MB so far\n' "$$(($$(date +%s) - began))" "$$(du -sm '$(VENV)' | cut -f1)" >&2; done; } & trap "kill $$! 2> /dev/null" EXIT;
 OLD_ENOUGH := import sys; v = sys.version_info; sys.exit(0 if v >= (3, 11) else "surgsim needs Python 3.11 or newer; %s is %d.%d. Set PYTHON=/path/to/python3.11" % (sys.executable, v[0], v[1]))
 
+# Containers often set this; every process would then compile all sources again, which takes longer than most commands.
+unexport PYTHONDONTWRITEBYTECODE
+
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
 .NOTPARALLEL:

@@ -8,6 +8,8 @@ from functools import cached_property, update_wrapper
 from typing import Any
 
 from numba import types
+from numba.core import event, sigutils
+from numba.core.compiler_lock import global_compiler_lock
 from numba.core.imputils import lower_cast
 from numba.core.registry import CPUDispatcher
 from numba.core.typeinfer import register_dispatcher
@@ -41,9 +43,33 @@ class _Form(CPUDispatcher):
         self._of_signature: dict[Any, _Form] = {}
 
     def compile(self, sig: Any) -> Any:
-        """The function compiled for the types of `sig`."""
-        with short_refusals(), _without_collecting():
-            return super().compile(sig)
+        """The function compiled for the types of `sig`.
+
+        What numba's own does, without its timers: one is told of every call of LLVM by each kernel under way.
+        """
+        arguments, returned = sigutils.normalize_signature(sig)
+        if arguments in self.overloads:
+            return self.overloads[arguments].entry_point
+        with short_refusals(), _without_collecting(), global_compiler_lock, self._compiling_counter:
+            if not self._can_compile:
+                raise RuntimeError("compilation disabled")
+            if arguments not in self.overloads:  # another thread may have been faster
+                self._make(sig, arguments, returned)
+            return self.overloads[arguments].entry_point
+
+    def _make(self, sig: Any, arguments: Any, returned: Any) -> None:
+        """Load the function from the cache, or compile it and keep it there."""
+        found = self._cache.load_overload(sig, self.targetctx)
+        if found is not None:
+            self.targetctx.insert_user_function(found.entry_point, found.fndesc, [found.library])
+            self.add_overload(found)
+            return
+        with event.trigger_event(
+            "numba:compile", data={"dispatcher": self, "args": arguments, "return_type": returned}
+        ):
+            made = self._compiler.compile(arguments, returned)
+            self.add_overload(made)
+        self._cache.save_overload(sig, made)
 
     def for_signature(self, signature: Any) -> "_Form":
         """The kernel compiled for `signature`, which takes no other types and returns its type."""

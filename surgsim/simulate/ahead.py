@@ -37,20 +37,20 @@ from surgsim.tick.arrays import A1, A2, Model, type_of
 
 def compile_kernels(joints: int) -> None:
     """Compile each kernel that no part changes, for an arm of so many joints."""
-    as_parameter(run_ticks, run_signature(joints))
-    as_parameter(decide, decide_signature(joints))
-    as_parameter(derive, derive_signature(joints))
-    as_parameter(hold_ticks, hold_signature(joints))
-    as_parameter(ask_task, ask_signature(joints))
     model, number = type_of(Model, joints), types.float64
     place, q = np.zeros(3), np.zeros(joints)
     typed: Any = numba.typeof
     on = typed(Manifold(rows=0, p_WT=place, p_WC=place, low=q, high=q))
+    as_parameter(run_ticks, run_signature(joints))
+    as_parameter(decide, decide_signature(joints))
     compile_for(project, model, on, A1, types.int64)
     compile_for(manipulability, A2)
     compile_for(climb, model, on, A1, types.int64, number)
     compile_for(is_inside, on, A1, number)
     compile_for(climb_from, model, on, A1, number, A1, A1)
+    as_parameter(derive, derive_signature(joints))
+    as_parameter(hold_ticks, hold_signature(joints))
+    as_parameter(ask_task, ask_signature(joints))
 
 
 @contextmanager
