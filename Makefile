@@ -23,11 +23,12 @@ INSTALLED_DOCS := $(VENV)/.surgsim-docs-$(STATE)
 INSTALLED_ALL := $(VENV)/.surgsim-all-$(STATE)
 # Python compiles a module when it is first imported; pip would compile all of them, which takes as long as the rest.
 PIP_INSTALL := "$(PY)" -m pip install --disable-pip-version-check --no-compile -c "$(ROOT)/constraints.txt"
-# uv installs in seconds what takes pip most of a minute. It is put beside the environment for as long as it is needed, and
-# asks the index that pip is configured for; where it cannot be had, or does not get through, pip does it all.
+# uv installs in seconds what takes pip most of a minute. The pip of $(PYTHON) puts it beside the environment for as long as
+# it is needed; it asks the index that pip is configured for. Where there is no uv to be had, or it does not get through,
+# a pip that the environment is given does it all.
 FAST := $(VENV)/.uv
-GET_FAST := $(PIP_INSTALL) --quiet --upgrade --target '$(FAST)' uv
-INDEX_OF_PIP := "$(PY)" -m pip config list 2> /dev/null | sed -nE "s/^(global|install|:env:)\.index-url='(.*)'$$/\2/p" | head -n 1
+GET_FAST := "$(PYTHON)" -m pip install --disable-pip-version-check --no-compile -c "$(ROOT)/constraints.txt" --quiet --upgrade --target '$(FAST)' uv
+INDEX_OF_PIP := "$(PYTHON)" -m pip config list 2> /dev/null | sed -nE "s/^(global|install|:env:)\.index-url='(.*)'$$/\2/p" | head -n 1
 BY_FAST := UV_SYSTEM_CERTS=1 "$(FAST)/bin/uv" pip install --no-config --python "$(PY)" $${INDEX:+--default-index "$$INDEX"} -c "$(ROOT)/constraints.txt"
 # Both say nothing while they unpack, uv outside a terminal not while it downloads: every ten seconds a line tells how much is there.
 ALIVE := began=$$(date +%s); { while sleep 10 > /dev/null 2>&1; do printf '  installing for %s s, %s MB so far\n' "$$(($$(date +%s) - began))" "$$(du -sm '$(VENV)' | cut -f1)" >&2; done; } & trap "kill $$! 2> /dev/null" EXIT;
@@ -86,13 +87,12 @@ clean:  ## remove build products and caches; .venv and runs stay
 	@cd '$(ROOT)' && rm -rf build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis
 	@find '$(ROOT)/surgsim' '$(ROOT)/tests' -name __pycache__ -type d -prune -exec rm -rf {} +
 
-# $(call install,REQUIREMENT). With pip the build tools come first, so that they too follow constraints.txt.
+# $(call install,REQUIREMENT). The build tools come first, so that they too follow constraints.txt.
 define install
 	@"$(PY)" -c '$(OLD_ENOUGH)'
-	@"$(PY)" -m pip --version > /dev/null 2>&1 || "$(PY)" -m ensurepip
 	@echo 'installing surgsim into $(VENV): about 1.5 GB' >&2
-	@exec >&2; $(ALIVE) { $(GET_FAST) && INDEX=$$($(INDEX_OF_PIP)) && $(BY_FAST) --quiet hatchling editables && $(BY_FAST) --no-build-isolation -e '$(1)'; } \
-	|| { echo 'not by uv: pip installs, which takes longer'; $(PIP_INSTALL) --quiet hatchling editables && $(PIP_INSTALL) --no-build-isolation -e '$(1)'; }
+	@exec >&2; $(ALIVE) { $(GET_FAST) && INDEX=$$($(INDEX_OF_PIP)) && $(BY_FAST) --quiet pip hatchling editables && $(BY_FAST) --no-build-isolation -e '$(1)'; } \
+	|| { echo 'not by uv: pip installs, which takes longer'; "$(PY)" -m pip --version > /dev/null 2>&1 || "$(PY)" -m ensurepip; $(PIP_INSTALL) --quiet hatchling editables && $(PIP_INSTALL) --no-build-isolation -e '$(1)'; }
 	@rm -rf '$(FAST)'
 	@rm -f '$(VENV)'/.surgsim-*
 endef
@@ -117,4 +117,4 @@ $(PY):
 	@test -n '$(PYTHON)' || { echo 'surgsim needs Python 3.11 or newer, and none was found. Set PYTHON=/path/to/python3.11' >&2; exit 1; }
 	@"$(PYTHON)" -c '' || { echo 'surgsim needs Python 3.11 or newer, and $(PYTHON) does not run. Set PYTHON=/path/to/python3.11' >&2; exit 1; }
 	@"$(PYTHON)" -c '$(OLD_ENOUGH)'
-	@"$(PYTHON)" -m venv '$(VENV)'
+	@"$(PYTHON)" -m venv --without-pip '$(VENV)'

@@ -43,25 +43,50 @@ def on_screen(show: Callable[[str], None]) -> Iterator[None]:
 
 
 @contextmanager
-def compiled_by_two(scenario: "Experiment") -> Iterator[None]:
-    """If kernels have to be compiled meanwhile, have a second process compile those that every run needs."""
-    from surgsim.scenario.schema import Scenario
+def compiled_by_two() -> Iterator[Callable[["Experiment"], None]]:
+    """If kernels have to be compiled meanwhile, have a second process compile those that every run needs.
 
+    It starts at once where no kernel is kept, else with the first that is compiled. It compiles from when the
+    scenario is known: what is yielded takes it.
+    """
     with ExitStack() as stack:
-
-        def start() -> None:
-            from surgsim.models.arm import ArmModel
-            from surgsim.simulate.ahead import compiling_ahead
-
-            if isinstance(scenario, Scenario):
-                joints = ArmModel(scenario.scene).limits.q_min.size
-                stack.enter_context(compiling_ahead(joints))
-
-        _helpers.append(start)
+        second = _Second(stack)
+        if not _any_is_kept():
+            second.start()
+        _helpers.append(second.start)
         try:
-            yield
+            yield second.runs
         finally:
-            _helpers.remove(start)
+            _helpers.remove(second.start)
+
+
+class _Second:
+    """A second process, which is told once for how many joints it compiles."""
+
+    def __init__(self, stack: ExitStack) -> None:
+        self._stack = stack
+        self._compile_for: Callable[[int], None] | None = None
+        self._scenario: Experiment | None = None
+
+    def start(self) -> None:
+        """Start the process, if there is none yet."""
+        from surgsim.simulate.ahead import compiling_ahead
+
+        if self._compile_for is None:
+            self._compile_for = self._stack.enter_context(compiling_ahead())
+            self._tell()
+
+    def runs(self, scenario: "Experiment") -> None:
+        """Say what is going to run."""
+        self._scenario = scenario
+        self._tell()
+
+    def _tell(self) -> None:
+        from surgsim.models.arm import ArmModel
+        from surgsim.scenario.schema import Scenario
+
+        if self._compile_for is not None and isinstance(self._scenario, Scenario):
+            self._compile_for(ArmModel(self._scenario.scene).limits.q_min.size)
 
 
 class _Shown:
@@ -139,6 +164,14 @@ class _Shown:
 
 def _overwrite(text: str) -> None:
     print(f"\r\x1b[K{text}", end="", file=sys.stderr, flush=True)
+
+
+def _any_is_kept() -> bool:
+    """Whether there are kernels of earlier starts."""
+    from surgsim.compiled.cache import SUFFIX
+    from surgsim.compiled.places import places
+
+    return any(next(place.glob(f"*{SUFFIX}"), None) is not None for place in places())
 
 
 def _is_kept() -> bool:

@@ -3,6 +3,7 @@
 import argparse
 import itertools
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -58,6 +59,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def execute(options: argparse.Namespace) -> int:
     """Run the scenario; 0 when it completed."""
     from surgsim.cli.kernels import compiled_by_two
+
+    with compiled_by_two() as runs:
+        return _execute(options, runs)
+
+
+def _execute(options: argparse.Namespace, runs: Callable[["Experiment"], None]) -> int:
+    """Run the scenario, and tell `runs` of it first."""
     from surgsim.cli.output import print_run, show_progress
     from surgsim.cli.table import print_prose
     from surgsim.errors import Outcome, SurgsimError, UnreachableError
@@ -81,7 +89,8 @@ def execute(options: argparse.Namespace) -> int:
     name = f"{scenario.controller_name}-seed{scenario.seed}"
     folder = options.out or _default_folder(Path("runs") / scenario.name, name, operator)
     shown = show_progress(f"{scenario.name} {scenario.controller_name}", operator in _LIVE)
-    with compiled_by_two(scenario), shown as progress:
+    runs(scenario)
+    with shown as progress:
         try:
             if options.live is not None:
                 from surgsim.live.showing import run_shown

@@ -48,14 +48,15 @@ class _Form(CPUDispatcher):
         What numba's own does, without its timers: one is told of every call of LLVM by each kernel under way.
         """
         arguments, returned = sigutils.normalize_signature(sig)
-        if arguments in self.overloads:
-            return self.overloads[arguments].entry_point
-        with short_refusals(), _without_collecting(), global_compiler_lock, self._compiling_counter:
-            if not self._can_compile:
-                raise RuntimeError("compilation disabled")
-            if arguments not in self.overloads:  # another thread may have been faster
-                self._make(sig, arguments, returned)
-            return self.overloads[arguments].entry_point
+        numbas: Any = self
+        known = numbas.overloads
+        if arguments not in known:
+            with short_refusals(), _without_collecting(), global_compiler_lock, self._compiling_counter:
+                if not numbas._can_compile:
+                    raise RuntimeError("compilation disabled")
+                if arguments not in known:  # another thread may have been faster
+                    self._make(sig, arguments, returned)
+        return known[arguments].entry_point
 
     def _make(self, sig: Any, arguments: Any, returned: Any) -> None:
         """Load the function from the cache, or compile it and keep it there."""
@@ -67,7 +68,7 @@ class _Form(CPUDispatcher):
         with event.trigger_event(
             "numba:compile", data={"dispatcher": self, "args": arguments, "return_type": returned}
         ):
-            made = self._compiler.compile(arguments, returned)
+            made = vars(self)["_compiler"].compile(arguments, returned)
             self.add_overload(made)
         self._cache.save_overload(sig, made)
 

@@ -2,15 +2,15 @@
 
 Where nothing is compiled yet a run waits for kernels for most of a minute. Half of them are the same whatever
 the parts are: the loop of the ticks, the decision, the derived columns, the climb in manipulability. They are
-compiled here, by `python -m surgsim.simulate.ahead JOINTS`. Of processes that need the same kernel one
-compiles it (`surgsim.compiled.lock`), so that nothing is done twice.
+compiled here, by `python -m surgsim.simulate.ahead`, which reads the number of joints. Of processes that need
+the same kernel one compiles it (`surgsim.compiled.lock`), so that nothing is done twice.
 """
 
 import os
 import subprocess
 import sys
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from typing import Any
 
@@ -54,17 +54,28 @@ def compile_kernels(joints: int) -> None:
 
 
 @contextmanager
-def compiling_ahead(joints: int) -> Iterator[None]:
-    """Compile what every run needs in a second process, which ends with the block; not on one processor."""
+def compiling_ahead() -> Iterator[Callable[[int], None]]:
+    """A second process, which ends with the block; there is none on one processor.
+
+    It gets ready at once, and compiles what every run needs from when what is yielded takes the number of
+    joints.
+    """
     silent, helper = subprocess.DEVNULL, None
     if cores() > 1:
         with suppress(OSError):  # then this process compiles everything
-            command, environment = module_program(__name__, str(joints))
+            command, environment = module_program(__name__)
             helper = subprocess.Popen(
                 command, env=environment, stdin=subprocess.PIPE, stdout=silent, stderr=silent
             )
+
+    def compile_for_joints(joints: int) -> None:
+        if helper is not None and helper.stdin is not None:
+            with suppress(OSError):  # it has ended
+                helper.stdin.write(f"{joints}\n".encode())
+                helper.stdin.flush()
+
     try:
-        yield
+        yield compile_for_joints
     finally:
         if helper is not None:
             helper.kill()
@@ -78,9 +89,11 @@ def _end_with_parent() -> None:
 
 
 def main() -> None:
-    """Compile everything, or until the process that asked for it ends."""
+    """Wait for the number of joints; compile everything, or until the process that asked for it ends."""
+    joints = sys.stdin.buffer.readline()
     threading.Thread(target=_end_with_parent, daemon=True).start()
-    compile_kernels(int(sys.argv[1]))
+    if joints:
+        compile_kernels(int(joints))
 
 
 if __name__ == "__main__":

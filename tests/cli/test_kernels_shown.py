@@ -67,24 +67,40 @@ def test_one_line_in_a_log(capsys, place, clock):
     assert capsys.readouterr() == ("", "compiling kernels (once): at most 7, less than a minute\n")
 
 
-def test_a_second_process_is_asked_for_once_and_only_if_something_is_compiled(monkeypatch, place, clock):
+@pytest.fixture
+def second(monkeypatch):
+    """What a second process is asked for."""
     asked = []
 
     @contextmanager
-    def ahead_of(joints):
-        asked.append(joints)
-        yield
+    def ahead_of():
+        asked.append("started")
+        yield asked.append
         asked.append("ended")
 
     monkeypatch.setattr(ahead, "compiling_ahead", ahead_of)
-    scenario = load_scenario("circle_lwr4plus")
+    return asked
+
+
+def test_a_second_process_starts_at_once_where_no_kernel_is_kept(place, second):
+    (place / "a.nbi").unlink()
+    with compiling_shown(), compiled_by_two() as runs:
+        assert second == ["started"]
+        runs(load_scenario("circle_lwr4plus"))
+        assert second == ["started", 7]
+        compile_two()
+    assert second == ["started", 7, "ended"]
+
+
+def test_else_it_starts_once_and_only_if_something_is_compiled(place, clock, second):
     clock(1.0)
-    with compiling_shown(), compiled_by_two(scenario):
-        assert asked == []
+    with compiling_shown(), compiled_by_two() as runs:
+        runs(load_scenario("circle_lwr4plus"))
+        assert second == []
         compile_two()
         compile_two()
-        assert asked == [7]
-    assert asked == [7, "ended"]
+        assert second == ["started", 7]
+    assert second == ["started", 7, "ended"]
 
 
 def test_how_long_many_take(capsys, place, clock):

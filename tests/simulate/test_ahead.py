@@ -52,7 +52,7 @@ def children(pid):
 
 def test_the_process_ends_with_the_block():
     before = set(children(os.getpid()))
-    with ahead.compiling_ahead(7):
+    with ahead.compiling_ahead():
         (helper,) = set(children(os.getpid())) - before
     assert helper not in children(os.getpid())
 
@@ -60,15 +60,16 @@ def test_the_process_ends_with_the_block():
 def test_on_one_processor_there_is_none(monkeypatch):
     monkeypatch.setattr(ahead, "cores", lambda: 1)
     before = children(os.getpid())
-    with ahead.compiling_ahead(7):
+    with ahead.compiling_ahead() as compile_for_joints:
         assert children(os.getpid()) == before
+        compile_for_joints(7)
 
 
 @pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="looks into /proc")
 def test_the_process_ends_when_the_first_is_killed():
     code = (
         "import time\nfrom surgsim.simulate.ahead import compiling_ahead\n"
-        "with compiling_ahead(7):\n    print('there', flush=True)\n    time.sleep(60)\n"
+        "with compiling_ahead() as told:\n    told(7)\n    print('there', flush=True)\n    time.sleep(60)\n"
     )
     first = subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE)
     assert first.stdout.readline() == b"there\n"
