@@ -7,10 +7,10 @@ draft which nobody locks is left over from a dead one. This holds across contain
 import os
 import re
 import shutil
-import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from secrets import token_hex
 
 from surgsim.recording.files import lock, release
 
@@ -28,13 +28,20 @@ def draft_of(folder: Path) -> Iterator[Path]:
         OSError: If the disk refuses.
     """
     clear_drafts(folder.parent, folder.name)
-    draft, handle = _locked(folder)
+    draft: Path | None = None
+    handle: int | None = None
     try:
+        while handle is None:  # a signal may come at any line: what is to be removed is known before it is there
+            draft = folder.parent / f".{folder.name}.{token_hex(8)}{_SUFFIX}"
+            draft.mkdir(mode=0o700)
+            handle = _locked(draft)
         draft.chmod(0o755)
         yield draft
     finally:
-        release(handle)
-        remove_tree(draft)
+        if handle is not None:
+            release(handle)
+        if draft is not None:
+            remove_tree(draft)
 
 
 def clear_drafts(parent: Path, name: str = "") -> None:
@@ -73,20 +80,16 @@ def remove_tree(folder: Path) -> None:
             return
 
 
-def _locked(folder: Path) -> tuple[Path, int]:
-    """A new draft and the handle that locks it; made again if another process took it for left over."""
-    while True:
-        draft = Path(tempfile.mkdtemp(prefix=f".{folder.name}.", suffix=_SUFFIX, dir=folder.parent))
-        try:
-            handle = os.open(draft, os.O_RDONLY)
-        except FileNotFoundError:
-            continue
-        except OSError:
-            remove_tree(draft)
-            raise
-        if lock(handle) is not False and draft.exists():
-            return draft, handle
-        release(handle)
+def _locked(draft: Path) -> int | None:
+    """The handle that locks a draft; None if another process took it for left over."""
+    try:
+        handle = os.open(draft, os.O_RDONLY)
+    except FileNotFoundError:
+        return None
+    if lock(handle) is not False and draft.exists():
+        return handle
+    release(handle)
+    return None
 
 
 def _remove_if_left(draft: Path) -> None:

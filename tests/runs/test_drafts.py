@@ -6,6 +6,7 @@ import sys
 
 import pytest
 
+from surgsim.runs import drafts
 from surgsim.runs.drafts import clear_drafts, draft_of
 from surgsim.runs.exchange import restore
 
@@ -84,3 +85,39 @@ def test_a_draft_can_be_renamed_into_place(tmp_path):
         (draft / "whole").write_text("")
         draft.rename(tmp_path / "run")
     assert [path.name for path in tmp_path.rglob("*")] == ["run", "whole"]
+
+
+def interrupted_at(line, work):
+    """Do the work, and interrupt it before so many lines of its module; whether it came so far."""
+    left = line
+
+    def local(frame, event, _):
+        nonlocal left
+        left -= event == "line"
+        if left < 0:
+            raise KeyboardInterrupt
+        return local
+
+    def trace(frame, event, _):
+        return local if frame.f_code.co_filename == drafts.__file__ else None
+
+    sys.settrace(trace)
+    try:
+        work()
+    except KeyboardInterrupt:
+        return True
+    finally:
+        sys.settrace(None)
+    return False
+
+
+def test_a_signal_at_any_line_before_the_block_leaves_nothing(tmp_path):
+    def work():
+        with draft_of(tmp_path / "run"):
+            sys.settrace(None)
+
+    lines = 0
+    while interrupted_at(lines, work):
+        assert list(tmp_path.iterdir()) == []
+        lines += 1
+    assert lines > 20
