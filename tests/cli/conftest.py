@@ -16,9 +16,12 @@ from typing import Any
 
 import pytest
 
-# A session of its own with the terminal as its controlling one, so that Ctrl-C reaches the command.
+# A session of its own with the terminal as its controlling one, so that Ctrl-C reaches the command. No
+# signal is ignored, as it is in what runs in the background or under nohup.
 _TAKE_TERMINAL = """
-import fcntl, os, sys, termios
+import fcntl, os, signal, sys, termios
+signal.signal(signal.SIGINT, signal.SIG_DFL)
+signal.signal(signal.SIGHUP, signal.SIG_DFL)
 fcntl.ioctl(0, termios.TIOCSCTTY, 0)
 os.execv(sys.argv[1], sys.argv[1:])
 """

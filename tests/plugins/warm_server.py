@@ -95,6 +95,7 @@ def _become(asked: dict[str, Any], streams: list[int]) -> list[str]:
         sys.warnoptions.clear()
         warnings.simplefilter("ignore")
     signal.signal(signal.SIGINT, signal.default_int_handler)
+    signal.signal(signal.SIGHUP, signal.SIG_DFL)  # ignored where tests run under nohup
     words: list[str] = asked["words"]
     sys.argv[1:] = words
     return words
