@@ -23,12 +23,15 @@ INSTALLED_DOCS := $(VENV)/.surgsim-docs-$(STATE)
 INSTALLED_ALL := $(VENV)/.surgsim-all-$(STATE)
 # Python compiles a module when it is first imported; pip would compile all of them, which takes as long as the rest.
 PIP_INSTALL := "$(PY)" -m pip install --disable-pip-version-check --no-compile -c "$(ROOT)/constraints.txt"
-# uv installs in seconds what takes pip most of a minute. The pip of $(PYTHON) puts it beside the environment for as long as
-# it is needed; it asks the index that pip is configured for. Where there is no uv to be had, or it does not get through,
-# a pip that the environment is given does it all.
+# uv installs in seconds what takes pip most of a minute. The pip of $(PYTHON), or one that the environment is given where
+# that has none, puts it beside the environment for as long as it is needed. It asks the index that pip is configured for.
+# Where there is no uv to be had, or it does not get through, pip does it all.
 FAST := $(VENV)/.uv
-GET_FAST := "$(PYTHON)" -m pip install --disable-pip-version-check --no-compile -c "$(ROOT)/constraints.txt" --quiet --upgrade --target '$(FAST)' uv
-INDEX_OF_PIP := "$(PYTHON)" -m pip config list 2> /dev/null | sed -nE "s/^(global|install|:env:)\.index-url='(.*)'$$/\2/p" | head -n 1
+NO_PIP := no pip: install that of your system, often called python3-pip or python3-venv
+OWN_PIP := { "$(PY)" -c 'import pip' 2> /dev/null || "$(PY)" -m ensurepip || { echo '$(NO_PIP)'; exit 1; }; }
+FIND_PIP := PIP='$(PYTHON)'; "$$PIP" -c 'import pip' 2> /dev/null || { $(OWN_PIP); PIP='$(PY)'; };
+GET_FAST := PIP_ROOT_USER_ACTION=ignore PIP_REQUIRE_VIRTUALENV=0 "$$PIP" -m pip install --disable-pip-version-check --no-compile -c "$(ROOT)/constraints.txt" --quiet --upgrade --target '$(FAST)' uv
+INDEX_OF_PIP := "$$PIP" -m pip config list 2> /dev/null | sed -nE "s/^(global|install|:env:)\.index-url='(.*)'$$/\2/p" | head -n 1
 BY_FAST := UV_SYSTEM_CERTS=1 "$(FAST)/bin/uv" pip install --no-config --python "$(PY)" $${INDEX:+--default-index "$$INDEX"} -c "$(ROOT)/constraints.txt"
 # Both say nothing while they unpack, uv outside a terminal not while it downloads: every ten seconds a line tells how much is there.
 ALIVE := began=$$(date +%s); { while sleep 10 > /dev/null 2>&1; do printf '  installing for %s s, %s MB so far\n' "$$(($$(date +%s) - began))" "$$(du -sm '$(VENV)' | cut -f1)" >&2; done; } & trap "kill $$! 2> /dev/null" EXIT;
@@ -91,8 +94,8 @@ clean:  ## remove build products and caches; .venv and runs stay
 define install
 	@"$(PY)" -c '$(OLD_ENOUGH)'
 	@echo 'installing surgsim into $(VENV): about 1.5 GB' >&2
-	@exec >&2; $(ALIVE) { $(GET_FAST) && INDEX=$$($(INDEX_OF_PIP)) && $(BY_FAST) --quiet pip hatchling editables && $(BY_FAST) --no-build-isolation -e '$(1)'; } \
-	|| { echo 'not by uv: pip installs, which takes longer'; "$(PY)" -m pip --version > /dev/null 2>&1 || "$(PY)" -m ensurepip; $(PIP_INSTALL) --quiet hatchling editables && $(PIP_INSTALL) --no-build-isolation -e '$(1)'; }
+	@exec >&2; $(ALIVE) $(FIND_PIP) { $(GET_FAST) && INDEX=$$($(INDEX_OF_PIP)) && $(BY_FAST) --quiet pip hatchling editables && $(BY_FAST) --no-build-isolation -e '$(1)'; } \
+	|| { echo 'not by uv: pip installs, which takes longer'; $(OWN_PIP); $(PIP_INSTALL) --quiet hatchling editables && $(PIP_INSTALL) --no-build-isolation -e '$(1)'; }
 	@rm -rf '$(FAST)'
 	@rm -f '$(VENV)'/.surgsim-*
 endef

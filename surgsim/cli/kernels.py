@@ -13,6 +13,7 @@ from surgsim.display import count
 
 if TYPE_CHECKING:
     from surgsim.scenario.arms import Experiment
+    from surgsim.scenario.schema import Scenario
 
 _PATIENCE_S = 3.0
 _EVERY_S = 180.0
@@ -51,7 +52,7 @@ def compiled_by_two() -> Iterator[Callable[["Experiment"], None]]:
     """
     with ExitStack() as stack:
         second = _Second(stack)
-        if not _any_is_kept():
+        if _is_kept() and not _any_is_kept():
             second.start()
         _helpers.append(second.start)
         try:
@@ -66,26 +67,32 @@ class _Second:
     def __init__(self, stack: ExitStack) -> None:
         self._stack = stack
         self._compile_for: Callable[[int], None] | None = None
-        self._scenario: Experiment | None = None
+        self._scenario: Scenario | None = None
+        self._helps = True
 
     def start(self) -> None:
-        """Start the process, if there is none yet."""
+        """Start the process, if there is none yet and it helps."""
         from surgsim.simulate.ahead import compiling_ahead
 
-        if self._compile_for is None:
+        if self._compile_for is None and self._helps:
             self._compile_for = self._stack.enter_context(compiling_ahead())
             self._tell()
 
     def runs(self, scenario: "Experiment") -> None:
-        """Say what is going to run."""
-        self._scenario = scenario
-        self._tell()
+        """Say what is going to run; several arms have other kernels."""
+        from surgsim.scenario.schema import Scenario
+
+        if isinstance(scenario, Scenario):
+            self._scenario = scenario
+            self._tell()
+        else:
+            self._helps = False
+            self._stack.close()
 
     def _tell(self) -> None:
         from surgsim.models.arm import ArmModel
-        from surgsim.scenario.schema import Scenario
 
-        if self._compile_for is not None and isinstance(self._scenario, Scenario):
+        if self._compile_for is not None and self._scenario is not None:
             self._compile_for(ArmModel(self._scenario.scene).limits.q_min.size)
 
 
@@ -171,7 +178,11 @@ def _any_is_kept() -> bool:
     from surgsim.compiled.cache import SUFFIX
     from surgsim.compiled.places import places
 
-    return any(next(place.glob(f"*{SUFFIX}"), None) is not None for place in places())
+    for place in places():
+        with suppress(OSError):  # a folder that this user may not look into
+            if next(place.glob(f"*{SUFFIX}"), None) is not None:
+                return True
+    return False
 
 
 def _is_kept() -> bool:

@@ -10,6 +10,7 @@ from typing import Any
 from numba import types
 from numba.core import event, sigutils
 from numba.core.compiler_lock import global_compiler_lock
+from numba.core.errors import ForceLiteralArg
 from numba.core.imputils import lower_cast
 from numba.core.registry import CPUDispatcher
 from numba.core.typeinfer import register_dispatcher
@@ -68,7 +69,13 @@ class _Form(CPUDispatcher):
         with event.trigger_event(
             "numba:compile", data={"dispatcher": self, "args": arguments, "return_type": returned}
         ):
-            made = vars(self)["_compiler"].compile(arguments, returned)
+            compiler = vars(self)["_compiler"]
+            try:
+                made = compiler.compile(arguments, returned)
+            except ForceLiteralArg as error:
+                raise error.bind_fold_arguments(
+                    lambda given, named: compiler.fold_argument_types(given, named)[1]
+                ) from None
             self.add_overload(made)
         self._cache.save_overload(sig, made)
 

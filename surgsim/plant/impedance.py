@@ -17,8 +17,8 @@ tau_J: damping of the link's speed through the gear would make a stiff loop unst
 
 Source: the Fast Research Interface's `doJntImpedanceControl` for what is commanded, with the damping as a
 ratio; its maker does not say of which inertia. For the motor's side: Albu-Schaeffer, Ott, Hirzinger, Int. J.
-Robotics Research 26:23 (2007). For limits and lost commands: the documentation of FCI, "Robot and interface
-specifications" and "libfranka: Under the hood".
+Robotics Research 26:23 (2007). For limits and lost commands: the documentation of the control interface FCI,
+"Robot and interface specifications" and "libfranka: Under the hood".
 """
 
 import math

@@ -31,8 +31,10 @@ def draft_of(folder: Path) -> Iterator[Path]:
     draft: Path | None = None
     handle: int | None = None
     try:
-        while handle is None:  # a signal may come at any line: what is to be removed is known before it is there
-            draft = folder.parent / f".{folder.name}.{token_hex(8)}{_SUFFIX}"
+        while (
+            handle is None
+        ):  # a signal may come at any line: what is to be removed is known before it is there
+            draft = folder.parent / f".{folder.name}.{token_hex(4)}{_SUFFIX}"
             draft.mkdir(mode=0o700)
             handle = _locked(draft)
         draft.chmod(0o755)

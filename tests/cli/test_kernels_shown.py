@@ -7,14 +7,15 @@ import subprocess
 import sys
 import time
 from contextlib import contextmanager
+from pathlib import Path
 
 import pytest
 
 from surgsim.cli import kernels
 from surgsim.cli.kernels import compiled_by_two, compiling_shown, on_screen
-from surgsim.compiled import places, watch
+from surgsim.compiled import cache, places, watch
 from surgsim.compiling import Compiling, tell
-from surgsim.scenario.load import load_scenario
+from surgsim.scenario.load import load_experiment, load_scenario
 from surgsim.simulate import ahead
 
 
@@ -101,6 +102,31 @@ def test_else_it_starts_once_and_only_if_something_is_compiled(place, clock, sec
         compile_two()
         assert second == ["started", 7]
     assert second == ["started", 7, "ended"]
+
+
+def test_it_ends_where_several_arms_run(place, clock, second):
+    (place / "a.nbi").unlink()
+    clock(1.0)
+    with compiling_shown(), compiled_by_two() as runs:
+        runs(load_experiment("two_ports_lwr4plus"))
+        assert second == ["started", "ended"]
+        compile_two()
+    assert second == ["started", "ended"]
+
+
+@pytest.mark.parametrize("refusal", ["nothing can be kept", "nothing can be looked at"])
+def test_none_starts_for_nothing_and_a_folder_that_refuses_is_no_error(monkeypatch, place, second, refusal):
+    (place / "a.nbi").unlink()
+    if refusal == "nothing can be kept":
+        monkeypatch.setattr(cache, "prepared", lambda place: False)
+    else:
+
+        def refused(self, pattern):
+            raise PermissionError
+
+        monkeypatch.setattr(Path, "glob", refused)
+    with compiling_shown(), compiled_by_two():
+        assert second == ([] if refusal == "nothing can be kept" else ["started"])
 
 
 def test_how_long_many_take(capsys, place, clock):

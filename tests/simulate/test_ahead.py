@@ -15,7 +15,7 @@ from surgsim.control.manifold import climb, climb_from, is_inside, project
 from surgsim.control.manipulability import manipulability
 from surgsim.metrics.catalog import compute_metrics
 from surgsim.scenario.load import load_scenario
-from surgsim.simulate import ahead
+from surgsim.simulate import ahead, kernels_of_every_run
 from surgsim.simulate.derived import derive
 from surgsim.simulate.loop import simulate
 from surgsim.simulate.ticks import ask_task, hold_ticks, run_ticks
@@ -42,7 +42,7 @@ def test_what_is_compiled_ahead_is_what_a_run_asks_for():
     compute_metrics(simulate(load_scenario("circle_lwr4plus", assignments=["task.duration_s=3"])))
     asked = forms()
     assert all(overloads or signatures for overloads, signatures in asked.values())
-    ahead.compile_kernels(7)
+    kernels_of_every_run.compile_kernels(7)
     assert forms() == asked
 
 
@@ -55,6 +55,31 @@ def test_the_process_ends_with_the_block():
     with ahead.compiling_ahead():
         (helper,) = set(children(os.getpid())) - before
     assert helper not in children(os.getpid())
+
+
+STAND_IN = """
+from surgsim.simulate import kernels_of_every_run as program
+program.compile_kernels = lambda joints: print(joints, flush=True)
+program.main()
+"""
+
+
+def test_the_process_compiles_for_the_joints_that_it_is_told():
+    with subprocess.Popen(
+        [sys.executable, "-c", STAND_IN],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+    ) as process:
+        process.stdin.write(b"7\n")
+        process.stdin.flush()
+        assert process.wait(60) == 0  # with its input still open
+        assert (process.stdout.read(), process.stderr.read()) == (b"7\n", b"")
+
+
+def test_the_process_ends_where_nobody_tells_it_anything():
+    done = subprocess.run([sys.executable, "-c", STAND_IN], input=b"", capture_output=True, timeout=60)
+    assert (done.returncode, done.stdout, done.stderr) == (0, b"", b"")
 
 
 def test_on_one_processor_there_is_none(monkeypatch):
