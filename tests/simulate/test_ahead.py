@@ -46,8 +46,13 @@ def test_what_is_compiled_ahead_is_what_a_run_asks_for():
     assert forms() == asked
 
 
+def words_of(pid, name):
+    """What the kernel tells of a process."""
+    return Path(f"/proc/{pid}/{name}").read_text(encoding="utf-8").split()
+
+
 def children(pid):
-    return [int(word) for word in Path(f"/proc/{pid}/task/{pid}/children").read_text().split()]
+    return [int(word) for word in words_of(pid, f"task/{pid}/children")]
 
 
 def test_the_process_ends_with_the_block():
@@ -103,6 +108,6 @@ def test_the_process_ends_when_the_first_is_killed():
     first.send_signal(signal.SIGKILL)
     first.communicate()
     until = time.monotonic() + 30.0
-    while Path(f"/proc/{helper}").exists() and "Z" not in Path(f"/proc/{helper}/stat").read_text().split()[2]:
+    while Path(f"/proc/{helper}").exists() and "Z" not in words_of(helper, "stat")[2]:
         assert time.monotonic() < until, "the process outlives the one that it works for"
         time.sleep(0.1)
