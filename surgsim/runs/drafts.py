@@ -28,13 +28,12 @@ def draft_of(folder: Path) -> Iterator[Path]:
         OSError: If the disk refuses.
     """
     clear_drafts(folder.parent, folder.name)
-    draft: Path | None = None
-    handle: int | None = None
+    draft, handle = _another(folder), None
     try:
         while (
             handle is None
         ):  # a signal may come at any line: what is to be removed is known before it is there
-            draft = folder.parent / f".{folder.name}.{token_hex(4)}{_SUFFIX}"
+            draft = _another(folder)
             draft.mkdir(mode=0o700)
             handle = _locked(draft)
         draft.chmod(0o755)
@@ -42,8 +41,7 @@ def draft_of(folder: Path) -> Iterator[Path]:
     finally:
         if handle is not None:
             release(handle)
-        if draft is not None:
-            remove_tree(draft)
+        remove_tree(draft)
 
 
 def clear_drafts(parent: Path, name: str = "") -> None:
@@ -80,6 +78,11 @@ def remove_tree(folder: Path) -> None:
             shutil.rmtree(folder, ignore_errors=True)
         if not folder.exists():
             return
+
+
+def _another(folder: Path) -> Path:
+    """A name that no draft of `folder` has."""
+    return folder.parent / f".{folder.name}.{token_hex(4)}{_SUFFIX}"
 
 
 def _locked(draft: Path) -> int | None:
