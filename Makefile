@@ -22,7 +22,8 @@ INSTALLED_DEV := $(VENV)/.surgsim-dev-$(STATE)
 INSTALLED_DOCS := $(VENV)/.surgsim-docs-$(STATE)
 INSTALLED_ALL := $(VENV)/.surgsim-all-$(STATE)
 # Python compiles a module when it is first imported; pip would compile all of them, which takes as long as the rest.
-PIP_INSTALL := "$(PY)" -m pip install --disable-pip-version-check --no-compile -c "$(ROOT)/constraints.txt"
+BY_PIP := -m pip install --disable-pip-version-check --no-compile -c "$(ROOT)/constraints.txt"
+PIP_INSTALL := "$(PY)" $(BY_PIP)
 # uv installs in seconds what takes pip most of a minute. The pip of $(PYTHON), or one that the environment is given where
 # that has none, puts it beside the environment for as long as it is needed. It asks the index that pip is configured for.
 # Where there is no uv to be had, or it does not get through, pip does it all.
@@ -30,7 +31,7 @@ FAST := $(VENV)/.uv
 NO_PIP := no pip: install that of your system, often called python3-pip or python3-venv
 OWN_PIP := { "$(PY)" -c 'import pip' 2> /dev/null || "$(PY)" -m ensurepip || { echo '$(NO_PIP)'; exit 1; }; }
 FIND_PIP := PIP='$(PYTHON)'; "$$PIP" -c 'import pip' 2> /dev/null || { $(OWN_PIP); PIP='$(PY)'; };
-GET_FAST := PIP_ROOT_USER_ACTION=ignore PIP_REQUIRE_VIRTUALENV=0 "$$PIP" -m pip install --disable-pip-version-check --no-compile -c "$(ROOT)/constraints.txt" --quiet --upgrade --target '$(FAST)' uv
+GET_FAST := PIP_ROOT_USER_ACTION=ignore PIP_REQUIRE_VIRTUALENV=0 "$$PIP" $(BY_PIP) --quiet --upgrade --target '$(FAST)' uv
 INDEX_OF_PIP := "$$PIP" -m pip config list 2> /dev/null | sed -nE "s/^(global|install|:env:)\.index-url='(.*)'$$/\2/p" | head -n 1
 BY_FAST := UV_SYSTEM_CERTS=1 "$(FAST)/bin/uv" pip install --no-config --python "$(PY)" $${INDEX:+--default-index "$$INDEX"} -c "$(ROOT)/constraints.txt"
 # Both say nothing while they unpack, uv outside a terminal not while it downloads: every ten seconds a line tells how much is there.

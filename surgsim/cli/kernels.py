@@ -52,7 +52,7 @@ def compiled_by_two() -> Iterator[Callable[["Experiment"], None]]:
     """
     with ExitStack() as stack:
         second = _Second(stack)
-        if _is_kept() and not _any_is_kept():
+        if not any(True for _ in _kept()) and _is_kept():
             second.start()
         _helpers.append(second.start)
         try:
@@ -173,16 +173,15 @@ def _overwrite(text: str) -> None:
     print(f"\r\x1b[K{text}", end="", file=sys.stderr, flush=True)
 
 
-def _any_is_kept() -> bool:
-    """Whether there are kernels of earlier starts."""
+def _kept() -> Iterator[tuple[Path, float]]:
+    """Folder of each kernel that is kept, and when it was used [s of the epoch]."""
     from surgsim.compiled.cache import SUFFIX
     from surgsim.compiled.places import places
 
     for place in places():
-        with suppress(OSError):  # a folder that this user may not look into
-            if next(place.glob(f"*{SUFFIX}"), None) is not None:
-                return True
-    return False
+        with suppress(OSError):  # a folder that this user may not look into, a kernel that goes meanwhile
+            for entry in place.glob(f"*{SUFFIX}"):
+                yield place, entry.stat().st_mtime
 
 
 def _is_kept() -> bool:
@@ -194,12 +193,8 @@ def _is_kept() -> bool:
 
 def _where(began_at: float) -> str:
     """Where what was compiled since `began_at`, seconds of the epoch, is kept; empty if nowhere."""
-    from surgsim.compiled.cache import SUFFIX
-    from surgsim.compiled.places import places
-
-    for place in places():
-        with suppress(OSError):
-            if any(entry.stat().st_mtime >= began_at for entry in place.glob(f"*{SUFFIX}")):
-                temporary = Path(tempfile.gettempdir()) in place.parents
-                return "; kept among the temporary files" if temporary else "; kept for the next start"
+    for place, used_at in _kept():
+        if used_at >= began_at:
+            temporary = Path(tempfile.gettempdir()) in place.parents
+            return "; kept among the temporary files" if temporary else "; kept for the next start"
     return ""

@@ -30,12 +30,9 @@ def draft_of(folder: Path) -> Iterator[Path]:
     clear_drafts(folder.parent, folder.name)
     draft, handle = _another(folder), None
     try:
-        while (
-            handle is None
-        ):  # a signal may come at any line: what is to be removed is known before it is there
+        # A signal may come at any line: what is to be removed is known before it is there.
+        while (handle := _made(draft)) is None:
             draft = _another(folder)
-            draft.mkdir(mode=0o700)
-            handle = _locked(draft)
         draft.chmod(0o755)
         yield draft
     finally:
@@ -85,8 +82,9 @@ def _another(folder: Path) -> Path:
     return folder.parent / f".{folder.name}.{token_hex(4)}{_SUFFIX}"
 
 
-def _locked(draft: Path) -> int | None:
-    """The handle that locks a draft; None if another process took it for left over."""
+def _made(draft: Path) -> int | None:
+    """Make a draft; the handle that locks it, or None if another process took it for left over."""
+    draft.mkdir(mode=0o700)
     try:
         handle = os.open(draft, os.O_RDONLY)
     except FileNotFoundError:
