@@ -31,9 +31,12 @@ from surgsim.compiled.places import places, prepared, usable
 SUFFIX = ".nbi"
 ENTRANCE = ".from_python"
 """What follows the name of a kernel in that of its entrance."""
-MOST_ENTRIES = 1500
+MOST_ENTRIES = 10_000
+"""Some 50 kB each. All tests together compile more than 2,000."""
 _MAGIC = b"surgsim kernel 3\n"
 _HOUR_S = 3_600.0
+_NOTED_S = 60.0
+"""How far the time at which an entry was last used may lag."""
 
 
 class KernelCache(_Cache):
@@ -185,7 +188,7 @@ def _read(path: Path) -> bytes | None:
     """Content of an entry; None if there is none, or it is not what was written."""
     try:
         content = path.read_bytes()
-        if time.time() - path.stat().st_mtime > _HOUR_S:
+        if time.time() - path.stat().st_mtime > _NOTED_S:
             with suppress(OSError):
                 os.utime(path)  # it is in use: it goes last
     except OSError:
@@ -229,9 +232,10 @@ def place_to_write() -> Path | None:
 def _evict(place: Path) -> None:
     """Remove what was not used for longest, and what killed processes left."""
     with suppress(OSError):
-        entries = sorted(_files(place, SUFFIX))
-        for _, path in entries[: max(0, len(entries) - MOST_ENTRIES)]:
-            path.unlink(missing_ok=True)
+        surplus = sum(name.endswith(SUFFIX) for name in os.listdir(place)) - MOST_ENTRIES
+        if surplus > 0:
+            for _, path in sorted(_files(place, SUFFIX))[:surplus]:
+                path.unlink(missing_ok=True)
         old = time.time() - _HOUR_S
         for used, path in (*_files(place, ".part"), *_files(place, ".lock")):
             if used < old:

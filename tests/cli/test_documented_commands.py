@@ -1,11 +1,12 @@
-"""Every command of the documents, as a person runs it: in a terminal of 80 and of 120 columns, to its end.
+"""Every command of the documents, as a person runs it: in a terminal of 80 columns, to its end.
 
 The commands are read from the fenced `bash` blocks, so that a new one is tested without further edits. What
 is shortened, what ends otherwise than with 0, and what cannot be run here is listed below.
 
-A page's first command starts as a person starts it; those after it are forks of a warm process. Each is typed
-in a narrow terminal, then in a wide one, in the same folder, where a batch goes on with `--resume` and finds
-its runs. One batch is begun in both, and its report has pictures; others are as where nothing can be drawn.
+A page's first command starts as a person starts it; those after it are forks of a warm process. The first of a
+kind on a page is typed in a terminal of 120 columns too, in the same folder, where a batch goes on with `--resume`
+and finds its runs. One batch is begun in both, and its report has pictures; others are as where nothing can be
+drawn.
 """
 
 import itertools
@@ -183,12 +184,15 @@ def test_a_slow_command(surgsim, tmp_path, page, typed):
 
 
 def run_all(surgsim, folder, page, typed):
-    """Type the commands, each at both widths, and look at it when it has ended."""
+    """Type the commands, the first of a kind at both widths, and look at each when it has ended."""
     for name, text in files(page):
         (folder / name).write_text(text)
-    cold = True
+    cold, seen = True, []
     for command in typed:
-        for columns in (80, 120):
+        kind = command.split(" --")[0].split()[:2]
+        widths = (80,) if kind in seen else (80, 120)
+        seen.append(kind)
+        for columns in widths:
             added = f"{SHORTER.get(command, '')} {again(command) if columns == 120 else ''}"
             variables, (program, *words) = with_variables(shlex.split(f"{command} {added}"))
             assert program == "surgsim", f"list {command} in NOT_HERE with a reason, or run it here"
