@@ -3,10 +3,10 @@
 The commands are read from the fenced `bash` blocks, so that a new one is tested without further edits. What
 is shortened, what ends otherwise than with 0, and what cannot be run here is listed below.
 
-A page's first command starts as a person starts it; those after it are forks of a warm process. The first of a
-kind on a page is typed in a terminal of 120 columns too, in the same folder, where a batch goes on with `--resume`
-and finds its runs. One batch is begun in both, and its report has pictures; others are as where nothing can be
-drawn.
+A page's first command starts as a person starts it; those after it are forks of a warm process. The first
+of a kind on a page is typed in a terminal of 120 columns too, in the same folder, where a batch goes on with
+`--resume` and finds its runs. One batch is begun in both, and its report has pictures; others are as where
+nothing can be drawn.
 """
 
 import itertools
