@@ -19,12 +19,18 @@ which is stable for any stiffness and takes no energy out. The armature is of th
 weight, and no inertia against motions of the arm that leave the shaft straight. The damping is in proportion
 to the stiffness, and implicit in MuJoCo's `implicitfast`.
 
+A shaft that is told to settle does not swing: the straight instrument keeps all of the mass, and the hinges
+go to their angles of rest under what presses on the shaft now, with two equal time constants T. Inertia K T²
+and damping 2 K T on every hinge do that, whatever the others do:
+
+    K (T² q'' + 2 T q' + q) = torque,    with the weights of the pieces beyond it in the torque
+
 Sources: Timoshenko and Gere, Mechanics of Materials, for the beam; Newmark, J. Eng. Mech. Div. ASCE 85
 (1959), with beta = 1/4, for the rule.
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import mujoco
@@ -43,6 +49,8 @@ BEND_JOINTS = tuple(f"bend{k}_{axis}" for k in range(1, HINGES + 1) for axis in 
 FIRST_MODE = 3.5160153
 """Square of the first root of cos x cosh x = -1."""
 _DRAWN, _LIGHTEST_KG, _HIDDEN = "shaft", 1e-3, 4
+_WEIGHTLESS = 1e-6
+"""Of a piece's mass: MuJoCo takes no body without any."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -52,10 +60,12 @@ class ElasticShaft:
     Attributes:
         rigidity: E I of the tube [N m²].
         damping_ratio: Of its first mode, clamped at the entry and free at the tip.
+        settling_s: Time constant T of a shaft that does not swing [s]; None: it swings.
     """
 
     rigidity: float
     damping_ratio: float
+    settling_s: float | None = None
 
 
 def tube_rigidity(outer_m: float, inner_m: float, young_pa: float) -> float:
@@ -105,14 +115,14 @@ def shaft_diameter(spec: mujoco.MjSpec) -> float:
     return 2.0 * float(drawn.size[0])
 
 
-def bend_shaft(spec: mujoco.MjSpec, shaft: ElasticShaft) -> float:
+def bend_shaft(spec: mujoco.MjSpec, shaft: ElasticShaft) -> tuple[float, Array]:
     """Split the shaft at its hinges; mass, centre of mass and inertia of the straight instrument stay.
 
     The bodies `shaft1` to `shaft4` follow `instrument`, which keeps the shaft up to the first hinge; the jaws
     and the site `tip` go to the last one.
 
     Returns:
-        Frequency of the first mode [rad/s].
+        Frequency of the first mode [rad/s], and masses of the tube's pieces on the four bodies (4,) [kg].
 
     Raises:
         SurgsimError: If there is no shaft that could bend, or it does already.
@@ -129,6 +139,9 @@ def bend_shaft(spec: mujoco.MjSpec, shaft: ElasticShaft) -> float:
         )
     places = hinge_places(length)
     pieces = [_Piece(a, b, mass * (b - a) / length, radius) for a, b in _spans(places, length)]
+    masses = np.array([piece.mass for piece in pieces])
+    if shaft.settling_s is not None:
+        pieces = [replace(piece, mass=_WEIGHTLESS * piece.mass) for piece in pieces]
     _take_off(body, entry, pieces)
     last = body
     for k, piece in enumerate(pieces, start=1):
@@ -138,7 +151,7 @@ def bend_shaft(spec: mujoco.MjSpec, shaft: ElasticShaft) -> float:
         _add_hinges(last, k, shaft, mass, length, float(spec.option.timestep))
     _draw(spec, entry, places)
     _move_end(spec, last, length - float(places[-1]))
-    return first_frequency(shaft.rigidity, mass, length)
+    return first_frequency(shaft.rigidity, mass, length), masses
 
 
 @dataclass(frozen=True)
@@ -189,11 +202,12 @@ def _add_hinges(
     body: mujoco.MjsBody, k: int, shaft: ElasticShaft, mass: float, length: float, timestep: float
 ) -> None:
     stiffness = shaft.rigidity / (0.5 * length / HALVES)
-    rate = 2.0 * shaft.damping_ratio / first_frequency(shaft.rigidity, mass, length)
+    settling = shaft.settling_s or 0.0
+    rate = 2.0 * (settling or shaft.damping_ratio / first_frequency(shaft.rigidity, mass, length))
     for name, axis in zip(BEND_JOINTS[2 * k - 2 : 2 * k], np.eye(3)[:2], strict=True):
         joint = body.add_joint(name=name, type=mujoco.mjtJoint.mjJNT_HINGE, axis=axis)
         joint.stiffness, joint.damping = [stiffness, 0.0, 0.0], [rate * stiffness, 0.0, 0.0]
-        joint.armature = 0.25 * timestep**2 * stiffness
+        joint.armature = (0.25 * timestep**2 + settling**2) * stiffness
 
 
 def _draw(spec: mujoco.MjSpec, entry: float, places: Array) -> None:

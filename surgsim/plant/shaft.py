@@ -143,22 +143,27 @@ def piece_lengths(scene: Scene) -> Array:
 def lateral_masses(scene: Scene, places: Array, h: float) -> Array:
     """What a force across the shaft accelerates as a mass (k,) [kg]; its adapter is held, and it bends.
 
-    m(a) = 1 / (J M^-1 J^T) with the inertia M of the hinges, armature included, and J = (a - x_i)+.
+    Of the masses M, the armature A, the stiffness K and the damping D of the hinges an explicit force meets
+
+        m(a) = 1 / (J N^-1 J^T),    N = M + A - h² K / 4 + h D / 2,    J = (a - x_i)+
+
+    for the implicit damping and the spring of the hinges themselves take part in a step.
 
     Args:
         scene: With a shaft that bends.
         places: Distances a from the shaft's entry (k,) [m].
-        h: The timestep, which the armature is of [s].
+        h: The timestep [s].
     """
     model, count = scene.model, bend_joints(scene)
     data, whole = mujoco.MjData(model), np.zeros((model.nv, model.nv))
     mujoco.mj_forward(model, data)
     mujoco.mj_fullM(model, data, whole)
     dofs = int(scene.dof_ids[-1]) + 1 + np.arange(0, count, 2)
-    M = whole[np.ix_(dofs, dofs)]
-    M += ((h / model.opt.timestep) ** 2 - 1.0) * np.diag(model.dof_armature[dofs])
+    stiffness = np.array([np.ravel(scene.parts.joint(name).stiffness)[0] for name in BEND_JOINTS[::2]])
+    N = whole[np.ix_(dofs, dofs)]  # its armature is that of the model's own timestep
+    N += np.diag(0.5 * h * model.dof_damping[dofs] - 0.25 * model.opt.timestep**2 * stiffness)
     J = np.maximum(places[:, None] - np.cumsum(piece_lengths(scene))[:-1], 0.0)
-    mobility = np.einsum("ki,ik->k", J, np.linalg.solve(M, J.T))
+    mobility = np.einsum("ki,ik->k", J, np.linalg.solve(N, J.T))
     masses: Array = 1.0 / np.maximum(mobility, _LEAST)
     return masses
 

@@ -15,6 +15,8 @@ from surgsim.scenario.load import load_experiment
 from surgsim.teleop.sight import SightConfig
 
 LATER: dict[tuple[str, str], object] = {
+    ("BendingShaftConfig", "level"): "dynamic",
+    ("BendingShaftConfig", "settling_s"): 0.005,
     ("DriveConfig", "command"): "torque",
     ("DriveConfig", "impedance_damping_ratio"): 0.7,
     ("DriveConfig", "impedance_stiffness_nm_per_rad"): 1000.0,

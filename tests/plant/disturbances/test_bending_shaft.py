@@ -31,6 +31,7 @@ TUBES = (
         np.pi / 64.0 * 45e9 * (0.0084**4 - 0.0064**4),
     ),
 )
+STATIC = BendingShaftConfig(level="static")
 tubes = pytest.mark.parametrize(("config", "rigidity"), TUBES, ids=["8/6", "5/4", "composite"])
 
 
@@ -182,8 +183,35 @@ def test_its_first_mode_is_damped_as_said(h):
     assert decrement / (2.0 * np.pi) == pytest.approx(0.03, rel=0.08)
 
 
-def test_straight_it_has_the_inertia_of_the_rigid_instrument():
-    (bent, _), (stiff, _) = scene_of(BendingShaftConfig()), scene_of()
+@pytest.mark.parametrize("h", [0.001, 0.00025])
+@tubes
+def test_a_static_shaft_goes_to_the_beams_shape_as_two_equal_lags_and_does_not_swing(config, rigidity, h):
+    """x(t) = x_rest (1 - (1 + t/T) exp(-t/T)) under a force that is there from the start."""
+    settling = 0.01
+    config = config.model_copy(update={"level": "static", "settling_s": settling})
+    scene, _ = scene_of(config, h=h)
+    held = Held(scene)
+    scene.model.dof_armature[scene.dof_ids] = 1e9
+    body = int(scene.model.site_bodyid[scene.tip_site])
+    force, seen = np.array([0.02, 0.0, 0.0]), []
+    for _ in range(round(12 * settling / h)):
+        torque = np.zeros(scene.model.nv)
+        tip = held.data.site_xpos[scene.tip_site]
+        mujoco.mj_applyFT(scene.model, held.data, held.axes @ force, np.zeros(3), tip, body, torque)
+        held.data.qfrc_applied[:] = torque
+        mujoco.mj_step(scene.model, held.data)
+        mujoco.mj_kinematics(scene.model, held.data)
+        seen.append(held.deflection(0.4, 0.4)[0])
+    x = np.array(seen) / (force[0] * 0.4**3 / (3.0 * rigidity))
+    t = h * np.arange(1, len(x) + 1) / settling
+    assert x[-1] == pytest.approx(1.0, rel=2e-4)
+    assert x.max() < 1.0005
+    np.testing.assert_allclose(x, 1.0 - (1.0 + t) * np.exp(-t), atol=0.6 * h / settling)
+
+
+@pytest.mark.parametrize("config", [BendingShaftConfig(), STATIC], ids=["dynamic", "static"])
+def test_straight_it_has_the_inertia_of_the_rigid_instrument(config):
+    (bent, _), (stiff, _) = scene_of(config), scene_of()
     held, plain = [], []
     for scene, found in ((bent, held), (stiff, plain)):
         data = mujoco.MjData(scene.model)
@@ -204,6 +232,20 @@ def test_the_controllers_model_stays_as_it_is(scenario):
     assert bent.arm.scene is build_arm(scenario().scene)
 
 
+def test_the_weight_of_a_static_shaft_moves_the_arm_as_that_of_a_rigid_one():
+    """What `hang` adds is felt by the shaft's own joints alone."""
+    moved = []
+    for config in (STATIC, BendingShaftConfig(level="static", young_pa=1e13)):
+        plant = _plant(0.0005, ledger=False, config=config)
+        plant.reset(Q)
+        hold = plant.world.tau.copy()
+        for _ in range(100):
+            plant.step(hold, np.zeros(7))
+        moved.append(plant.truth().q)
+    np.testing.assert_allclose(moved[0], moved[1], atol=1e-9)
+    np.testing.assert_allclose(moved[0], Q, atol=1e-9)
+
+
 def _plant(h, *, wall=None, ledger=True, config=None, aside=0.0):
     axis_home = Held(scene_of(h=h)[0])
     place = axis_home.entry + axis_home.axes @ [aside, 0.0, 0.22]
@@ -212,12 +254,13 @@ def _plant(h, *, wall=None, ledger=True, config=None, aside=0.0):
     return DynamicPlant(scene, 0.001, parts, energy_ledger=ledger)
 
 
+@pytest.mark.parametrize("config", [BendingShaftConfig(), STATIC], ids=["dynamic", "static"])
 @pytest.mark.parametrize("wall", [None, WallConfig()], ids=["ideal", "wall"])
-def test_energy_only_falls_where_nothing_drives_it(wall):
+def test_energy_only_falls_where_nothing_drives_it(wall, config):
     """The arm falls through the port, which bends the shaft; what the ledger cannot explain is small."""
     risen = []
     for h in (0.0005, 0.00025):
-        plant = _plant(h, wall=wall)
+        plant = _plant(h, wall=wall, config=config)
         plant.reset(Q)
         names = [name for block in plant.columns for name in block.columns]
         rows = []
@@ -237,8 +280,9 @@ def test_energy_only_falls_where_nothing_drives_it(wall):
     assert risen[1][1] < 0.6 * risen[0][1]  # of first order: Coriolis forces, as of the rigid arm
 
 
-def test_the_run_begins_at_rest_under_its_own_weight():
-    plant = _plant(0.0005, ledger=False, config=BendingShaftConfig(damping_ratio=0.0))
+@pytest.mark.parametrize("config", [BendingShaftConfig(damping_ratio=0.0), STATIC], ids=["dynamic", "static"])
+def test_the_run_begins_at_rest_under_its_own_weight(config):
+    plant = _plant(0.0005, ledger=False, config=config)
     plant.reset(Q)
     start = plant.truth()
     straight = Held(scene_of()[0])
@@ -279,11 +323,15 @@ def _segment_distance(p, a, b):
     return float(np.linalg.norm(p - a - s * (b - a)))
 
 
-def test_pressed_on_the_wall_it_bends_by_the_walls_force():
+@pytest.mark.parametrize(
+    ("config", "h"),
+    [(BendingShaftConfig(damping_ratio=0.3), 0.00025), (STATIC, 0.001)],
+    ids=["dynamic", "static"],
+)
+def test_pressed_on_the_wall_it_bends_by_the_walls_force(config, h):
     """The arm is held 3 mm beside the port: wall, shaft and bore are in balance."""
     wall = WallConfig(seal_friction_n=0.0)
-    calm = BendingShaftConfig(damping_ratio=0.3)
-    plant = _plant(0.00025, wall=wall, ledger=False, config=calm, aside=0.003)
+    plant = _plant(h, wall=wall, ledger=False, config=config, aside=0.003)
     scene, model = plant._scene, plant._scene.model
     model.dof_armature[scene.dof_ids] = 1e9
     model.opt.gravity[:] = 0.0
@@ -302,8 +350,9 @@ def test_pressed_on_the_wall_it_bends_by_the_walls_force():
     assert np.linalg.norm(push) == pytest.approx((0.003 - scene.clearance_m) / compliance, rel=0.02)
 
 
+@pytest.mark.parametrize("level", ["dynamic", "static"])
 @pytest.mark.parametrize("drive", ["ideal", "real"])
-def test_the_timestep_matters_as_little_as_to_a_rigid_shaft(scenario, drive):
+def test_the_timestep_matters_as_little_as_to_a_rigid_shaft(scenario, drive, level):
     """Under tissue; the errors fall with the timestep."""
 
     def errors(shaft):
@@ -320,7 +369,7 @@ def test_the_timestep_matters_as_little_as_to_a_rigid_shaft(scenario, drive):
             tips.append(trace.block("tip"))
         return [np.abs(tip - tips[-1]).max() for tip in tips[:-1]]
 
-    stiff, bent = errors(""), errors("{type: bending_shaft}, ")
+    stiff, bent = errors(""), errors(f"{{type: bending_shaft, level: {level}}}, ")
     assert bent[0] < 1.5 * stiff[0]
     assert bent[1] < 0.65 * bent[0]
 
@@ -390,6 +439,18 @@ _SHAFT = "disturbances=[{type: bending_shaft}]"
             ("disturbances=[{type: bending_shaft, young_pa: 1.0e8}]",),
             "too soft to bear its own weight",
         ),
+        (
+            ("disturbances=[{type: bending_shaft, level: static, young_pa: 1.0e8}]",),
+            "too soft to bear its own weight",
+        ),
+        (
+            ("disturbances=[{type: bending_shaft, level: static, settling_s: 0.0015}]",),
+            r"settling_s 0\.0015 must be at least 2 timesteps of 0\.001 s",
+        ),
+        (
+            ("disturbances=[{type: bending_shaft, level: static, settling_s: 0.002}]", "trocar.wall={}"),
+            r"a shorter timestep_s than 0\.001: 0\.00025 will do, or a longer settling_s",
+        ),
     ],
 )
 def test_what_cannot_be_is_refused(scenario, changes, message):
@@ -400,6 +461,18 @@ def test_what_cannot_be_is_refused(scenario, changes, message):
 def test_a_tube_must_be_one(scenario):
     with pytest.raises(ScenarioError, match=r"inner_diameter_m 0\.006 must be below the outer one, 0\.005"):
         scenario("disturbances=[{type: bending_shaft, outer_diameter_m: 0.005}]")
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ("level: static, damping_ratio: 0.1", "damping_ratio is of a shaft with `level: dynamic`"),
+        ("settling_s: 0.01", "settling_s is of a shaft with `level: static`"),
+    ],
+)
+def test_a_key_of_the_other_level_is_refused(scenario, changes, message):
+    with pytest.raises(ScenarioError, match=message):
+        scenario(f"disturbances=[{{type: bending_shaft, {changes}}}]")
 
 
 def test_a_push_on_the_shaft_acts_on_the_piece_that_has_the_point():
@@ -441,5 +514,5 @@ def test_an_instrument_from_a_file_does_not_bend(scenario, tmp_path):
 def test_stiff_tissue_needs_a_shorter_timestep_at_a_light_tip(scenario):
     stiff = "{type: tissue, stiffness_n_per_m: 20000.0, drag_n_s_per_m: 50.0}"
     prepare(scenario(f"disturbances=[{stiff}]"))
-    with pytest.raises(SurgsimError, match=r"k h\^2 \+ b h must be at most 0\.01\d* kg"):
+    with pytest.raises(SurgsimError, match=r"k h\^2 \+ b h must be at most 0\.009\d* kg"):
         prepare(scenario(f"disturbances=[{{type: bending_shaft}}, {stiff}]"))
