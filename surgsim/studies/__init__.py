@@ -19,8 +19,8 @@ such as a network on its own. None is longer than 300 lines.
 
 What any study may use is beside it: measures of a trace (measures.py, stepped.py), rows compared
 (compared.py), random samples and homes (samples.py, homes.py), random starts (starts.py), two stages of a
-procedure (stages.py), levels of disturbance (levels.py), a problem held still (still.py), and the attainable
-manipulability by the timing of a run (attainable.py).
+procedure (stages.py), levels of disturbance and ladders of them (levels.py), a problem held still (still.py),
+a program that is timed (timed.py), and the attainable manipulability by the timing of a run (attainable.py).
 
 `run_study` (engine.py) runs the cases in several processes, tells of progress, keeps what is measured so that
 a study that was interrupted goes on, and hands over to tables, claims, figures and page. It knows no paper.

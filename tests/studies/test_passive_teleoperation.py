@@ -21,14 +21,24 @@ from surgsim.studies.passive_teleoperation.cases import (
     SHIPPED,
     Push,
     Shipped,
-    Timed,
     sweep,
 )
 from surgsim.studies.passive_teleoperation.measures import frontier_table, steadiness, worst
 from surgsim.studies.passive_teleoperation.page import beside_the_paper
+from surgsim.studies.timed import Timed
 
 RESULTS = Path(__file__).resolve().parents[2] / "results" / "passive_teleoperation"
-TABLES = ("paper", "scenarios", "comparison", "frontier", "pushes", "guarded", "timing")
+TABLES = (
+    "paper",
+    "scenarios",
+    "paper_real",
+    "scenarios_real",
+    "comparison",
+    "frontier",
+    "pushes",
+    "guarded",
+    "timing",
+)
 
 
 @pytest.fixture(scope="module")
@@ -116,6 +126,7 @@ def tables():
         "scenarios": [
             scenario_row(name, **(LIMITS if name == "workspace limits" else {})) for name in SHIPPED
         ],
+        "scenarios_real": [scenario_row(name) for name in SHIPPED],
         "pushes": pushes,
         "comparison": pushes,
         "guarded": [
@@ -146,7 +157,7 @@ def scenario_of(tables, name):
 def test_every_claim_holds_that_can(tables):
     expected = [*3 * ["holds"], "not comparable", *6 * ["holds"]]
     assert verdicts(paper_claims(tables)) == expected
-    assert verdicts(own_claims(tables)) == 6 * ["holds"]
+    assert verdicts(own_claims(tables)) == 7 * ["holds"]
 
 
 @pytest.mark.parametrize(
@@ -225,14 +236,18 @@ def test_our_own_claims_turn(tables):
             row.update(drift_end_mm=0.05, end="rests")
     scenario_of(tables, "free motion").update(energy_residual_percent=1.1)
     tables["timing"][0].update(qp_p99_us=201.0)
-    assert verdicts(own_claims(tables)) == [
-        "does not hold",
-        "depends",
-        "does not hold",
-        "does not hold",
-        "does not hold",
-        "does not hold",
-    ]
+    for row in tables["scenarios_real"]:
+        row.update(rcm_rms_mm=0.31, velocity_aligned_mm_per_s=4.8)
+    assert verdicts(own_claims(tables)) == ["does not hold", "depends", *5 * ["does not hold"]]
+
+
+@pytest.mark.parametrize(
+    "changes", [{"rcm_rms_mm": 0.31}, {"velocity_aligned_mm_per_s": 4.8}, {"outcome": "stuck"}]
+)
+def test_what_a_scenario_on_real_drives_must_keep(tables, changes):
+    tables["scenarios_real"][1].update(changes)
+    (claim,) = [claim for claim in own_claims(tables) if "real drives" in claim.text]
+    assert claim.verdict == "depends"
 
 
 def test_claims_without_rows_are_left_out(tables):
@@ -348,7 +363,7 @@ def test_a_push_made_again_gives_the_committed_row(committed):
 
 def test_the_committed_page_shows_every_claim(committed):
     claims = STUDY.judge(committed)
-    assert len(claims) == 16
+    assert len(claims) == 17
     page = (RESULTS / "README.md").read_text()
     assert "    surgsim reproduce passive_teleoperation\n" in page
     for claim in claims:
@@ -365,6 +380,21 @@ def test_the_committed_sweep_is_whole(committed):
     wall = [row for row in committed["pushes"] if row["place"] == "wall"]
     assert len(wall) == len(sweep())
     assert frontier_table(committed["pushes"]) == committed["frontier"]
+
+
+def test_a_scenario_on_real_drives_made_again_gives_the_committed_row(committed):
+    row = Shipped("wall, 10 % loss", real=True).measured().row
+    (stored,) = [other for other in committed["scenarios_real"] if other["scenario"] == row["scenario"]]
+    for name, value in row.items():
+        assert value == stored[name] or value == pytest.approx(stored[name], rel=1e-3, abs=1e-6), name
+
+
+def test_on_real_drives_a_scenario_keeps_its_workspace():
+    ideal, real = (Shipped("workspace limits", real=real).scenario() for real in (False, True))
+    assert real.robot.drive is not None
+    assert real.controller.resolver.planes == ideal.controller.resolver.planes
+    assert real.controller.resolver.tip_speed_max_m_per_s == 0.03
+    assert real.controller.torque_law.type == "rcm_elastic_dynamics"
 
 
 @pytest.mark.slow

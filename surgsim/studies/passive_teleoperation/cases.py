@@ -1,17 +1,11 @@
-"""The passive teleoperation paper's numbers, its shipped scenarios, one push that is varied, and timing."""
+"""The passive teleoperation paper's numbers, its shipped scenarios, and one push that is varied."""
 
-from dataclasses import dataclass, replace
+import json
+from dataclasses import dataclass
 from itertools import product
-from time import thread_time
-from typing import ClassVar, Literal, get_args
+from typing import Literal, get_args
 
-import numpy as np
-
-from surgsim.array import Array
-from surgsim.columns import scalar, width
-from surgsim.control.resolvers.base import KernelResolver
-from surgsim.control.resolvers.passive_qp import PassiveQpConfig
-from surgsim.models.arm import ArmModel
+from surgsim.catalog import PartConfig
 from surgsim.scenario.load import load_scenario
 from surgsim.scenario.schema import Scenario
 from surgsim.studies.passive_teleoperation.measures import (
@@ -20,10 +14,9 @@ from surgsim.studies.passive_teleoperation.measures import (
     push_measures,
     shipped_measures,
 )
-from surgsim.studies.study import Curves, Paper, Printed, SimulatedCase
-from surgsim.studies.tables import Cell, Row
+from surgsim.studies.study import Curves, Judged, Paper, Printed, SimulatedCase, Verdict
+from surgsim.studies.tables import Row, Tables, number, pick
 from surgsim.teleop.messages import PassivityMode
-from surgsim.tick.arrays import Resolved, Seen
 from surgsim.trace.trace import Trace
 
 Place = Literal["wall", "free"]
@@ -51,6 +44,9 @@ SHIPPED: dict[str, str] = {
 }
 """The paper's experiment and what it claims, by name."""
 
+ENERGY_TOLERANCE_J = 1e-6
+"""What a tank may owe, for rounding."""
+
 _ROW = (
     "controller.resolver.passivity=true",
     "controller.resolver.kinetic=false",
@@ -58,6 +54,8 @@ _ROW = (
     "controller.torque_law.press_max_n=null",
 )
 """The paper's energy row in place of what the shipped scenarios have: `passive_convex`."""
+_OURS = ("passivity", "kinetic", "kinetic_lag_s", "kinetic_share")
+"""What `passive_elastic` changes of a scenario's resolver, whose workspace stays."""
 _GUARDS: dict[Guard, tuple[str, ...]] = {
     "row": _ROW,
     "nothing": (*_ROW[1:], "controller.resolver.passivity=false"),
@@ -170,19 +168,29 @@ class Shipped(SimulatedCase):
     Attributes:
         name: What the study calls it.
         keys: Assignments that change it.
+        real: On real drives, under the controller of ours that is for them: no drive is in the paper's law.
     """
 
     name: str
     keys: tuple[str, ...] = ()
+    real: bool = False
 
     @property
     def label(self) -> str:
         """In words."""
-        return self.name
+        return f"{self.name}{', real drives' if self.real else ''}"
 
     def scenario(self) -> Scenario:
         """The scenario; its theatre, which has no part in it, is left out, and the row is the paper's."""
-        return load_scenario(SHIPPED[self.name], assignments=["theatre=false", *_ROW, *self.keys])
+        keys = ("theatre=false", *(self._on_drives() if self.real else _ROW), *self.keys)
+        return load_scenario(SHIPPED[self.name], assignments=keys)
+
+    def _on_drives(self) -> tuple[str, ...]:
+        ours = load_scenario(SHIPPED[self.name], controller="passive_elastic").controller
+        resolver = (f"controller.resolver.{name}={getattr(ours.resolver, name)}" for name in _OURS)
+        assert isinstance(ours.torque_law, PartConfig)
+        law = json.dumps(ours.torque_law.model_dump(mode="json"))
+        return "robot.drive=real", f"controller.torque_law={law}", *resolver
 
     def measures(self, trace: Trace) -> Row:
         """Accuracy, tanks, slack, constraints."""
@@ -221,60 +229,6 @@ class Guarded(SimulatedCase):
         return {"place": self.place, "guard": self.guard, **guarded_measures(trace)}
 
 
-class TimedQpConfig(PassiveQpConfig):
-    """`passive_qp` whose trace has the time of each step as `qp_time_s`."""
-
-    def build(self, arm: ArmModel) -> KernelResolver:
-        """The resolver, its kernel called from Python."""
-        inner = super().build(arm)
-        last = width(inner.columns)
-
-        def kernel(gains: Array, seen: Seen, memory: Array, out: Resolved) -> int:
-            began = thread_time()
-            status = inner.kernel(gains, seen, memory, out)
-            out.values[last] = thread_time() - began
-            return status
-
-        return replace(inner, kernel=kernel, columns=(*inner.columns, scalar("qp_time", "s")))
-
-
-@dataclass(frozen=True)
-class Timed(SimulatedCase):
-    """How long a tick of a shipped scenario takes, in the time of its thread: differs between machines.
-
-    Attributes:
-        shipped: The scenario.
-        warm_ticks: Ticks that do not count.
-    """
-
-    alone: ClassVar[bool] = True
-    shipped: Shipped
-    warm_ticks: int = 100
-
-    @property
-    def label(self) -> str:
-        """In words."""
-        return f"timing, {self.shipped.name}"
-
-    def scenario(self) -> Scenario:
-        """The scenario with its QP timed."""
-        scenario = self.shipped.scenario()
-        controller = scenario.controller
-        assert isinstance(controller.resolver, PassiveQpConfig)
-        resolver = TimedQpConfig(**controller.resolver.model_dump())
-        return scenario.model_copy(
-            update={"controller": controller.model_copy(update={"resolver": resolver})}
-        )
-
-    def measures(self, trace: Trace) -> Row:
-        """Median and 99th percentile of a tick's time [us]."""
-        found: dict[str, Cell] = {"scenario": self.shipped.name, "ticks": len(trace) - self.warm_ticks}
-        for name, column in (("qp", "qp_time_s"), ("controller", "control_time_s")):
-            time_us = 1e6 * trace[column][self.warm_ticks :]
-            found |= {f"{name}_p{at}_us": float(np.percentile(time_us, at)) for at in (50, 99)}
-        return found
-
-
 def comparison(place: Place, delays_ms: tuple[int, ...] = (PAPER["round_trip"],)) -> list[Push]:
     """Every way of keeping passive, in both grips, over a clean channel."""
     return [
@@ -297,3 +251,29 @@ def sweep() -> list[Push]:
         for seed in (LOSSY_SEEDS if (grip, delay) == ("light", PAPER["round_trip"]) else LOSSY_SEEDS[:1])
     ]
     return [*comparison("wall", DELAYS_MS), *lossy]
+
+
+def judge_energy_row(tables: Tables) -> Judged | None:
+    """The claim of the energy row, where it acts: it must keep the tank from what it would owe without."""
+    rows = tables.get("guarded", ())
+    if not rows:
+        return None
+    owed = {(row["place"], row["guard"]): 1e3 * number(row, "deficit_j") for row in rows}
+    places = sorted({str(row["place"]) for row in rows})
+    kept = [owed[place, "row"] <= 1e3 * ENERGY_TOLERANCE_J for place in places]
+    needed = [owed[place, "nothing"] > 1e3 * ENERGY_TOLERANCE_J for place in places]
+    acting = {str(row["place"]): row for row in pick(rows, guard="row")}
+    told = "; ".join(
+        f"{place}: taken from an empty tank {owed[place, 'nothing']:.3g} mJ without it, "
+        f"{owed[place, 'row']:.3g} mJ with it, {owed[place, 'valve']:.3g} mJ with the valve in its place; "
+        f"it acts in {number(acting[place], 'acts_percent'):.2g} % of the ticks, the command changing by "
+        f"{number(acting[place], 'acceleration_ratio'):.3g} times its limit"
+        for place in places
+    )
+    others = pick(tables["pushes"], passivity="tank")
+    acts = sum(number(row, "passivity_percent") > 0.0 for row in others)
+    part: Verdict = "depends" if any(kept) or any(needed) else "does not hold"
+    return "holds" if all(kept + needed) else part, (
+        f"{told}. In the pushes it limits the tip in {acts} of {len(others)}: "
+        "there the operator's tank and its refill do the work"
+    )

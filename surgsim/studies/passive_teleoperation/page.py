@@ -173,7 +173,8 @@ is in [docs/teleoperation.md](../../docs/teleoperation.md). Everything here is m
     {command}
 
 with {versions}. The CSV files hold every table with nine digits;
-`scenarios.csv` is the first table on its side, and `pushes.csv`, one row for every push, is not shown."""
+`scenarios.csv` and `scenarios_real.csv` are the first two tables on their side, and `pushes.csv`, one row for
+every push, is not shown."""
 _SCENARIOS = """## The paper's scenarios
 
 The shipped `teleop_free_motion_panda`, `teleop_workspace_limits_panda`, `teleop_wall_panda` (with 5 ms jitter
@@ -181,6 +182,11 @@ and 10 % loss each way) and `peg_and_ring_panda`, seed 0. Velocity errors are RM
 command that has arrived, `not aligned` against what the master does now, both while no constraint acts and
 nothing is touched; `all ticks` is aligned, with contact and constraints. The paper's figures are of a task
 with pegs and rings."""
+_REAL = """## The same on real drives
+
+The paper's arm is a real one: these are the figures to put beside its own. The drives are elastic, with
+friction on the motors. The law above does not know of them, so this is `passive_elastic`, ours, with each
+scenario's own workspace: the same program, its command behind the energy budget, over a law for drives."""
 _COMPARISON_TEXT = """## Tank, passivity controller, nothing
 
 One push through a clean round trip of 300 ms: the hand moves aside, then to 15 mm below the wall's surface,
@@ -236,6 +242,7 @@ _COLUMNS = (
 
 SECTIONS = (
     Section(_SCENARIOS, "paper", ("tracking.png", "tanks.png", "constraints.png")),
+    Section(_REAL, "paper_real"),
     Section(_COMPARISON_TEXT, "comparison", ("comparison.png",), columns=_COLUMNS),
     Section(_FRONTIER, "frontier", ("sweep.png",)),
     Section(_GUARDED, "guarded"),

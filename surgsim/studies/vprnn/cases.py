@@ -1,7 +1,6 @@
 """The VPRNN paper's numbers, the controllers, what the arm has that they do not know, and the arm's runs."""
 
 from dataclasses import dataclass
-from itertools import product
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -10,7 +9,7 @@ from surgsim.metrics.optimality import attainable_manipulability
 from surgsim.scenario.load import load_scenario
 from surgsim.scenario.schema import Scenario
 from surgsim.studies.figure import BLACK, BLUE, GREEN, ORANGE, PURPLE, VERMILLION
-from surgsim.studies.levels import NOMINAL, Level
+from surgsim.studies.levels import NOMINAL, Drive, Ladder, Level
 from surgsim.studies.measures import tracking
 from surgsim.studies.stages import LedThenTracking
 from surgsim.studies.starts import RandomStart, Spread
@@ -44,7 +43,10 @@ METHODS: dict[str, Method] = {
     "nullspace": Method("Nullspace", "gradient", VERMILLION, "--"),
     "rnn": Method("RNN", "rnn", BLUE, "-."),
     "vprnn": Method("VPRNN", "vprnn", PURPLE),
-    "rcm_inverse_dynamics": Method("rcm_inverse_dynamics (ours)", "rcm_inverse_dynamics", GREEN),
+    **{
+        name: Method(f"{name} (ours)", name, GREEN)
+        for name in ("rcm_inverse_dynamics", "rcm_elastic_dynamics")
+    },
     "self_motion": Method("self_motion (ours)", "self_motion", ORANGE, (0, (5, 1))),
     "rnn_tip": Method("RNN without RCM rows", "rnn", keys=("controller.resolver.rcm=false",)),
     **{name: Method(name, name) for name in ("pinv", "qp", "mink")},
@@ -59,14 +61,15 @@ PAPER_SIZE = Level(0.5, 0.5)
 """With the second the errors of VPRNN are of the size of the paper's figures, see the ladder."""
 LEVELS = (NOMINAL, PAPER_SIZE)
 PAYLOADS_KG = (0.0, 0.25, 0.5, 0.75, 1.0)
-FRICTIONS_NM = (0.0, 0.25, 0.5, 1.0, 2.0, 5.0)
-GRID = tuple(Level(m, f) for m, f in product(PAYLOADS_KG, FRICTIONS_NM))
-OURS = tuple(
-    level
-    for level in GRID
-    if 0.0 in (level.payload_kg, level.coulomb_nm) or level in (Level(1.0, 0.5), Level(1.0, 5.0))
+_LADDERS: tuple[tuple[str, str, Drive, tuple[float, ...]], ...] = (
+    ("rcm_inverse_dynamics", "ladder", "ideal", (0.0, 0.25, 0.5, 1.0, 2.0, 5.0)),
+    ("rcm_elastic_dynamics", "ladder_real", "real", (0.0, 2.0, 4.0, 8.0, 12.0)),
 )
-"""The ladder: VPRNN at every combination, ours at each error alone and at two of the corners."""
+LADDERS = {
+    ours: Ladder(table, drive, PAYLOADS_KG, frictions, LABEL["vprnn"], LABEL[ours])
+    for ours, table, drive, frictions in _LADDERS
+}
+"""By the controller of ours that stands beside VPRNN; friction up to what an LWR4+ was found to have."""
 ERRORS = ("tip_rms_mm", "tip_max_mm", "rcm_rms_mm", "rcm_max_mm")
 SAMPLES = 45
 EVERY = 10
@@ -80,7 +83,7 @@ _FIXED = ("theatre=false", "safety.rcm_error_max_m=null", "safety.stop_at_collis
 def sinusoid(method: str, level: Level = NOMINAL, keys: tuple[str, ...] = ()) -> Scenario:
     """The sinusoid with a controller; no RCM error stops a run, however far off the skin is passed."""
     found = METHODS[method]
-    assignments = (*_FIXED, level.disturbances, *found.keys, *keys)
+    assignments = (*_FIXED, *level.assignments, *found.keys, *keys)
     return load_scenario("sinusoid_lwr4plus", controller=found.controller, assignments=assignments)
 
 
