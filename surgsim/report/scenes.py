@@ -10,9 +10,12 @@ from typing import Any
 
 from surgsim.packages import lacking
 from surgsim.report.results import Results
+from surgsim.report.scene_process import main
 from surgsim.resources import run_module
 
 _LONGEST_S = 120.0
+_NO_DRAWING = ("disable", "disabled", "off", "false", "0")
+"""What MuJoCo takes for the wish not to draw."""
 Point = tuple[float, float, float]
 
 
@@ -57,20 +60,21 @@ def _source(results: Results, name: str) -> str:
 def look(scenarios: tuple[str, ...]) -> tuple[SceneView, ...]:
     """Scenes of scenarios, given by name or path."""
     undrawn = None
-    drawn = not lacking("", "OpenGL", "PIL")
-    for environment in _environments() if drawn else ():
+    for environment in _environments():
         found = _ask({"scenarios": scenarios, "draw": True}, environment)
         if found is not None and all(scene["picture"] for scene in found):
             return tuple(map(_view, found))
         undrawn = undrawn or found
-    if undrawn is None:  # every process that was to draw was lost
-        undrawn = _ask({"scenarios": scenarios, "draw": False}, dict(os.environ))
-    return tuple(map(_view, undrawn or ()))
+    if undrawn is None:  # nobody could draw, or every process that was to was lost
+        undrawn = main({"scenarios": scenarios, "draw": False})
+    return tuple(map(_view, undrawn))
 
 
 def _environments() -> list[dict[str, str]]:
     """Where MuJoCo is told how to draw: what the user says, else without a display first."""
     own = dict(os.environ)
+    if lacking("", "OpenGL", "PIL") or own.get("MUJOCO_GL", "").lower() in _NO_DRAWING:
+        return []
     return [own] if "MUJOCO_GL" in own else [{**own, "MUJOCO_GL": "egl"}, own]
 
 

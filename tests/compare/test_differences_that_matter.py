@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.stats import binomtest
 
 from surgsim.compare.aggregates import ranks, scores
 from surgsim.compare.leaderboard import leaderboard
@@ -129,6 +130,14 @@ def test_who_fails_more_comes_after_whatever_its_figures(runs_of):
     assert chance_of_failures(found) == 0.5  # two pairs in which one alone failed: (1 + 1)/4
     told = summary(runs, TIP, leaderboard(runs, TIP)).first
     assert told.endswith(" once fails more often: 1 of its paired runs against 0 (p = 1.0 by chance alone).")
+
+
+@pytest.mark.parametrize("alone", [(0, 0), (0, 1), (1, 1), (0, 5), (2, 7), (9, 4), (30, 31)])
+def test_the_chance_of_failures_is_that_of_the_exact_binomial_test(runs_of, alone):
+    found = compare_pair(runs_of({"a": line([0.1] * 3), "b": line([0.2] * 3)}, matters=0.1), "a", "b", TIP)
+    found = replace(found, left_out={"a failed": alone[0], "b failed": alone[1]})
+    wanted = binomtest(alone[0], sum(alone), 0.5).pvalue if sum(alone) else 1.0
+    assert chance_of_failures(found) == pytest.approx(wanted, abs=1e-12)
 
 
 def test_who_misses_the_task_more_often_comes_after(runs_of):

@@ -1,4 +1,4 @@
-"""dm_env's own contract tests, on every shipped scenario with every kind of action."""
+"""dm_env's own contract tests: every shipped scenario with a kind of action, every kind with some."""
 
 import unittest
 from typing import get_args
@@ -9,6 +9,7 @@ from dm_env.test_utils import EnvironmentTestMixin
 from surgsim.env import load
 from surgsim.env.actions import Action
 from surgsim.errors import SurgsimError
+from surgsim.scenario.load import of_one_arm, shipped
 
 
 def _contract(scenario, action):
@@ -21,9 +22,28 @@ def _contract(scenario, action):
     return Contract
 
 
-@pytest.mark.parametrize("action", get_args(Action))
-def test_the_contract_of_dm_env_holds(shipped_name, brief_scenario, action):
-    scenario = brief_scenario(shipped_name)
+ACTIONS = get_args(Action)
+NAMES = of_one_arm(shipped())
+
+
+def test_the_contract_of_dm_env_holds_on_every_scenario(shipped_name, brief_scenario):
+    """The kinds of action take turns: what a scenario has and what an action does are two things."""
+    keeps_the_contract(brief_scenario(shipped_name), ACTIONS[NAMES.index(shipped_name) % len(ACTIONS)])
+
+
+@pytest.mark.parametrize("action", ACTIONS)
+@pytest.mark.parametrize("name", ["circle_iiwa14", "theatre_fr3", "teleop_wall_lwr4plus"])
+def test_the_contract_of_dm_env_holds_with_every_kind_of_action(brief_scenario, name, action):
+    keeps_the_contract(brief_scenario(name), action)
+
+
+def test_every_kind_of_action_has_its_turn():
+    turns = {ACTIONS[NAMES.index(name) % len(ACTIONS)] for name in NAMES}
+    assert turns == set(ACTIONS)
+
+
+def keeps_the_contract(scenario, action):
+    """Run dm_env's tests; a plant that takes no torque must refuse that kind of action."""
     if action == "torque" and not scenario.plant.uses_torque:
         with pytest.raises(SurgsimError, match="torque"):
             load(scenario, action=action)

@@ -93,18 +93,26 @@ def ask(monkeypatch, answers):
 def test_drawing_is_tried_without_a_display_then_with_one_then_not_at_all(monkeypatch):
     lost = (-11, "")
     late = subprocess.TimeoutExpired("python", 120.0)
-    asked = ask(monkeypatch, [lost, late, json.dumps([{**SCENE, "picture": None}])])
+    asked = ask(monkeypatch, [lost, late])
     (found,) = scenes.drawn(("circle_lwr4plus",))
-    assert asked == [(True, "egl"), (True, None), (False, None)]
-    assert found.picture is None
+    assert asked == [(True, "egl"), (True, None)]
+    assert (found.robot, found.picture) == ("lwr4plus", None)
+
+
+@pytest.mark.parametrize("said", ["disable", "off", "0"])
+def test_where_nothing_is_to_be_drawn_no_process_is_started(monkeypatch, said):
+    asked = ask(monkeypatch, [])
+    monkeypatch.setenv("MUJOCO_GL", said)
+    (found,) = scenes.drawn(("circle_lwr4plus",))
+    assert (found.robot, found.picture, asked) == ("lwr4plus", None, [])
 
 
 def test_the_first_picture_is_taken_and_an_answer_that_is_none_is_done_without(monkeypatch):
     asked = ask(monkeypatch, [json.dumps([SCENE])])
     assert scenes.drawn(("circle_lwr4plus",))[0].picture == "abc"
     assert asked == [(True, "egl")]
-    ask(monkeypatch, ["{", "3", ""])
-    assert scenes.drawn(("circle_lwr4plus",)) == ()
+    ask(monkeypatch, ["{", "3"])
+    assert scenes.drawn(("no_such_scenario",)) == ()
 
 
 def test_where_nothing_is_drawn_but_the_scene_is_told_nobody_is_asked_again(monkeypatch):
