@@ -25,6 +25,9 @@ and damping 2 K T on every hinge do that, whatever the others do:
 
     K (T² q'' + 2 T q' + q) = torque,    with the weights of the pieces beyond it in the torque
 
+The damping is implicit, and the armature K (T - h/2)², so that both poles of a step are real and equal,
+(2 T - h) / (2 T + h): without overshoot.
+
 Sources: Timoshenko and Gere, Mechanics of Materials, for the beam; Newmark, J. Eng. Mech. Div. ASCE 85
 (1959), with beta = 1/4, for the rule.
 """
@@ -207,7 +210,8 @@ def _add_hinges(
     for name, axis in zip(BEND_JOINTS[2 * k - 2 : 2 * k], np.eye(3)[:2], strict=True):
         joint = body.add_joint(name=name, type=mujoco.mjtJoint.mjJNT_HINGE, axis=axis)
         joint.stiffness, joint.damping = [stiffness, 0.0, 0.0], [rate * stiffness, 0.0, 0.0]
-        joint.armature = (0.25 * timestep**2 + settling**2) * stiffness
+        lag = settling - 0.5 * timestep if settling else 0.5 * timestep
+        joint.armature = lag**2 * stiffness
 
 
 def _draw(spec: mujoco.MjSpec, entry: float, places: Array) -> None:

@@ -62,13 +62,14 @@ def check_step(scene: Scene, part: str, stiffness: float, damping: float, dampin
     Raises:
         SurgsimError: With what the tip bears.
     """
-    h, lightest = float(scene.model.opt.timestep), LIGHTEST_TIP_KG
+    h, lightest, hint = float(scene.model.opt.timestep), LIGHTEST_TIP_KG, ""
     if bend_joints(scene):
+        hint = "; a shaft that bends with level static bears more with a longer settling_s"
         of_shaft = lateral_masses(scene, piece_lengths(scene).sum(keepdims=True), h)
         lightest = float(1.0 / (1.0 / lightest + 1.0 / of_shaft[0]))
     if stiffness * h**2 + damping * h > lightest:
         raise SurgsimError(
             f"{part}: k h^2 + b h must be at most {lightest:.2g} kg with stiffness_n_per_m k {stiffness:g}, "
             f"{damping_key} b {damping:g} and simulation.timestep_s h {h:g}, not "
-            f"{stiffness * h**2 + damping * h:.3g} kg"
+            f"{stiffness * h**2 + damping * h:.3g} kg{hint}"
         )

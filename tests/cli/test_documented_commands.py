@@ -189,7 +189,7 @@ def run_all(surgsim, folder, page, typed):
         (folder / name).write_text(text)
     cold, seen = True, []
     for command in typed:
-        kind = command.split(" --")[0].split()[:2]
+        kind = kind_of(command)
         widths = (80,) if kind in seen else (80, 120)
         seen.append(kind)
         for columns in widths:
@@ -207,6 +207,13 @@ def run_all(surgsim, folder, page, typed):
             assert too_wide(done.lines, columns) == []
             assert broken(done.lines) == []
             cold = False
+
+
+def kind_of(command):
+    """What it prints may be laid out alike: the subcommand, what `list` lists, and the options."""
+    _, (_, name, *words) = with_variables(shlex.split(command))
+    options = {word.partition("=")[0] for word in words if word.startswith("--")} - {"--set", "--out"}
+    return name, words[0] if name == "list" else "", options
 
 
 def with_variables(words):
@@ -242,6 +249,18 @@ def broken(lines):
         if start + end in NAMES and start not in NAMES:
             found.append((above, below))
     return found
+
+
+def test_commands_of_one_kind_have_the_same_options():
+    one, other = (kind_of(f"surgsim export runs/{name} --figure {name}.pdf") for name in "ab")
+    assert one == other
+    assert kind_of("env A=1 surgsim run x --set a=1 --out y") == kind_of("surgsim run z")
+    for words in ("export runs/a --table a.md", "list robots", "list suites", "run x --live"):
+        assert kind_of(f"surgsim {words}") not in (
+            one,
+            kind_of("surgsim list tasks"),
+            kind_of("surgsim run x"),
+        )
 
 
 def test_the_checks_above_catch_what_they_should():

@@ -1,4 +1,4 @@
-"""The passive teleoperation paper's numbers, its shipped scenarios, and one push that is varied."""
+"""The passive teleoperation paper's numbers, its scenarios, one varied push, and runs where its row acts."""
 
 import json
 from dataclasses import dataclass
@@ -54,8 +54,6 @@ _ROW = (
     "controller.torque_law.press_max_n=null",
 )
 """The paper's energy row in place of what the shipped scenarios have: `passive_convex`."""
-_OURS = ("passivity", "kinetic", "kinetic_lag_s", "kinetic_share")
-"""What `passive_elastic` changes of a scenario's resolver, whose workspace stays."""
 _GUARDS: dict[Guard, tuple[str, ...]] = {
     "row": _ROW,
     "nothing": (*_ROW[1:], "controller.resolver.passivity=false"),
@@ -187,8 +185,10 @@ class Shipped(SimulatedCase):
 
     def _on_drives(self) -> tuple[str, ...]:
         ours = load_scenario(SHIPPED[self.name], controller="passive_elastic").controller
-        resolver = (f"controller.resolver.{name}={getattr(ours.resolver, name)}" for name in _OURS)
         assert isinstance(ours.torque_law, PartConfig)
+        assert isinstance(ours.resolver, PartConfig)
+        changed = ours.resolver.model_dump(mode="json", exclude_unset=True, exclude={"type"})
+        resolver = (f"controller.resolver.{name}={json.dumps(value)}" for name, value in changed.items())
         law = json.dumps(ours.torque_law.model_dump(mode="json"))
         return "robot.drive=real", f"controller.torque_law={law}", *resolver
 

@@ -219,8 +219,8 @@ joints'."""
 _LADDER_REAL = """## Payload and friction on real drives
 
 The same on real drives: gears with springs, and the friction where most of an arm's is, on the motors. The
-torque loop divides it by eight, so that 4 N m, which the shipped arm has, are 0.5 N m to who commands. What
-was identified on an LWR4+ is 5 to 12 N m, which no torque loop had divided."""
+torque loop divides it by eight: of the shipped arm's 4 N m the controller meets 0.5 N m. On an LWR4+ 5 to 12
+N m were identified (cited from memory), measured without a torque loop."""
 _NETWORKS = """## Convergence of the networks
 
 On the velocity problem of one instant, held still. VPRNN from a random z(0), so delta(0) = W z(0) - l; RNN
