@@ -32,7 +32,7 @@ SUFFIX = ".nbi"
 ENTRANCE = ".from_python"
 """What follows the name of a kernel in that of its entrance."""
 MOST_ENTRIES = 10_000
-"""Some 50 kB each. All tests together compile more than 2,000."""
+"""Some 50 kB each. All tests together compile some 1,500."""
 _MAGIC = b"surgsim kernel 3\n"
 _HOUR_S = 3_600.0
 _NOTED_S = 60.0

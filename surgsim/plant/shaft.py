@@ -132,6 +132,11 @@ def bend_joints(scene: Scene) -> int:
     return count
 
 
+def bend_stiffness(scene: Scene) -> Array:
+    """Of the joints of a shaft that bends (8,) [N m/rad]."""
+    return np.array([np.ravel(scene.parts.joint(name).stiffness)[0] for name in BEND_JOINTS])
+
+
 def piece_lengths(scene: Scene) -> Array:
     """Of the pieces of a shaft that bends, from the entry on (k,) [m]."""
     model, hinges = scene.model, bend_joints(scene) // 2
@@ -159,7 +164,7 @@ def lateral_masses(scene: Scene, places: Array, h: float) -> Array:
     mujoco.mj_forward(model, data)
     mujoco.mj_fullM(model, data, whole)
     dofs = int(scene.dof_ids[-1]) + 1 + np.arange(0, count, 2)
-    stiffness = np.array([np.ravel(scene.parts.joint(name).stiffness)[0] for name in BEND_JOINTS[::2]])
+    stiffness = bend_stiffness(scene)[::2]
     N = whole[np.ix_(dofs, dofs)]  # its armature is that of the model's own timestep
     N += np.diag(0.5 * h * model.dof_damping[dofs] - 0.25 * model.opt.timestep**2 * stiffness)
     J = np.maximum(places[:, None] - np.cumsum(piece_lengths(scene))[:-1], 0.0)

@@ -1,7 +1,8 @@
-"""What the scenes of some scenarios look like, worked out in a process of its own.
+"""What the scenes of some scenarios look like; to draw them, worked out in a process of its own.
 
 A machine without OpenGL may end the process that draws, or leave it waiting. So the report asks this one, by
-JSON on standard input and output, and does without its answer where there is none.
+JSON on standard input and output. Where there is no answer, or nothing can be drawn, it calls `main` itself,
+which then draws nothing.
 """
 
 import base64

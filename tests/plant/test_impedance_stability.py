@@ -79,8 +79,8 @@ def predicted(arm, stiffness, gain, feedforward, **drive):
 
 def _projector(setup, data, port):
     """pinv(J) J of the tip and of the shaft's point at the port, across the shaft (n, n)."""
-    scene, found = setup.arm.scene, np.zeros((3, setup.arm.scene.model.nv))
-    tip, across = setup.arm.kinematics(setup.q_start).Jv_WT, found.copy()
+    scene, across = setup.arm.scene, np.zeros((3, setup.arm.scene.model.nv))
+    tip = setup.arm.kinematics(setup.q_start).Jv_WT
     body = int(scene.model.site_bodyid[scene.tip_site])
     mujoco.mj_jac(scene.model, data, across, None, port, body)
     axis = data.site_xmat[scene.tip_site].reshape(3, 3)[:, 2]

@@ -17,7 +17,7 @@ from surgsim.models.config import WallConfig
 from surgsim.plant.bore import FUNNEL_LENGTH_M
 from surgsim.plant.disturbances.base import Disturbance, DisturbanceConfig
 from surgsim.plant.disturbances.settling import settle_cannula
-from surgsim.plant.shaft import bend_joints, lateral_masses, piece_lengths
+from surgsim.plant.shaft import bend_joints, bend_stiffness, lateral_masses, piece_lengths
 from surgsim.tick.arrays import World
 from surgsim.tick.scratch import scratch
 from surgsim.tick.status import GOES_ON
@@ -175,7 +175,7 @@ class BendingShaft(Disturbance):
         self.gains[GRAVITY] = model.opt.gravity
         at = slice(first, first + bend_joints(scene))
         places = [int(scene.parts.joint(name).qposadr[0]) for name in BEND_JOINTS]
-        stiffness = np.array([np.ravel(scene.parts.joint(name).stiffness)[0] for name in BEND_JOINTS])
+        stiffness = bend_stiffness(scene)
         posed = mujoco.MjData(model)
         posed.qpos[:] = data.qpos
         posed.qpos[places] = 0.0
@@ -194,10 +194,10 @@ class BendingShaft(Disturbance):
 
 
 def _weights(scene: Scene, masses: Array) -> Array:
-    """Gains of `hang` for pieces of those masses (k,) [kg]."""
-    model, parts = scene.model, scene.parts
+    """Gains of `hang` for pieces of those masses (k,) [kg], as yet without gravity."""
+    parts = scene.parts
     pieces = [(int(parts.body(f"shaft{k}").id), mass) for k, mass in enumerate(masses, start=1)]
-    return np.array([*model.opt.gravity, int(parts.body("instrument").id), *np.ravel(pieces)])
+    return np.array([0.0, 0.0, 0.0, int(parts.body("instrument").id), *np.ravel(pieces)])
 
 
 def _add_weights(gains: Array, model: mujoco.MjModel, data: mujoco.MjData, torque: Array) -> None:
